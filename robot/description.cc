@@ -56,6 +56,11 @@ int RobotDescription::FindParameter(const std::string& parameter) const {
   return -1;
 }
 
+bool RobotDescription::IsUncertain(const std::string& path) const {
+  return std::any_of(parameters.begin(), parameters.end(),
+                     [&](const ParameterDescription& p) { return Covers(p.name, path); });
+}
+
 namespace {
 
 namespace fs = std::filesystem;

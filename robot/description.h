@@ -57,6 +57,8 @@ struct RobotDescription {
   Eigen::VectorXd ToPhysical(const Eigen::VectorXd& coordinates) const;
   /// Index of a parameter, -1 if there is none of that name.
   int FindParameter(const std::string& parameter) const;
+  /// Whether a parameter is what is at that path, or covers it.
+  bool IsUncertain(const std::string& path) const;
 };
 
 /// Reads a robot from a folder (its robot.toml) or from a TOML file. A relative path that is not

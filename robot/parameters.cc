@@ -1,6 +1,7 @@
 #include "robot/parameters.h"
 
 #include <fmt/format.h>
+#include <fnmatch.h>
 
 #include <algorithm>
 #include <array>
@@ -91,6 +92,10 @@ void ReadParameters(Config& root, std::vector<ParameterDescription>& parameters,
   }
   if (parameters.empty())
     root.Fail("parameter", "is missing: at least one [[parameter]] that is not frozen");
+}
+
+bool Covers(const std::string& name, const std::string& path) {
+  return name == path || fnmatch(name.c_str(), path.c_str(), FNM_PATHNAME | FNM_NOESCAPE) == 0;
 }
 
 double ParameterDescription::coordinate_variance() const {

@@ -9,7 +9,8 @@
 namespace plumb {
 
 /// One uncertain simulator parameter, named by a path such as "gravity", "mass/pole", "delay/hip":
-/// see sim/parameters.h.
+/// see sim/parameters.h. With a wildcard it is one number for parts that are alike:
+/// "friction/*_hip".
 struct ParameterDescription {
   enum class Coordinate { kLinear, kLog, kLogit };
   std::string name;
@@ -28,6 +29,10 @@ struct ParameterDescription {
   double ToPhysical(double coordinate_value) const;
   double ToCoordinate(double physical_value) const;
 };
+
+/// Whether a parameter of that name is what is at `path`, or one number for it and others: `name`
+/// may have the wildcards of fnmatch(3), of which none stands for a slash. Thread-safe.
+bool Covers(const std::string& name, const std::string& path);
 
 /// A parameter with a known value, which replaces that of the URDF and of robot.toml's tables.
 struct FrozenParameter {

@@ -31,7 +31,6 @@ Environment::Environment(std::shared_ptr<const Model> model)
 
 void Environment::SendThroughDriver() {
   const RobotDescription& robot = model_->description();
-  if (robot.num_positions() != robot.num_velocities()) return;
   constexpr double kNothing = 1e-9;  // [s] that rounding leaves
   parts_.clear();
   for (const bool late : {false, true}) {
@@ -41,9 +40,12 @@ void Environment::SendThroughDriver() {
       parts_.push_back({cycle, late});
     }
   }
-  limits_.resize(robot.joints.size());
-  for (const int joint : robot.driven())
-    limits_[static_cast<size_t>(joint)] = LimitsOf(robot.joints[static_cast<size_t>(joint)]);
+  drives_.clear();
+  Eigen::Index position = 0, velocity = 0;
+  for (const JointDescription& joint : robot.joints) {
+    if (!joint.passive) drives_.push_back({position, velocity, LimitsOf(joint)});
+    position += joint.num_positions(), velocity += joint.num_velocities();
+  }
 }
 
 void Environment::SetResidual(std::shared_ptr<const Residual> residual, size_t draw) {
@@ -105,12 +107,12 @@ void Environment::Begin(const Eigen::Ref<const Eigen::VectorXf>& action) {
 // Without a driver as a recorded step with these efforts is simulated, in the same substeps: a log
 // of this environment is its model's to the last bit.
 void Environment::Send(const Part& part) {
-  if (!limits_.empty()) {
+  if (!drives_.empty()) {
     const Eigen::VectorXd& wish = part.late ? next_effort_ : effort_;
-    for (Eigen::Index i = 0; i < wish.size(); ++i) {
-      const auto& limits = limits_[static_cast<size_t>(i)];
-      const JointSituation joint{q()[i], v()[i], sent_[i], part.duration};
-      sent_[i] = limits ? LimitEffort(wish[i], joint, *limits).value_or(0) : wish[i];
+    for (const Drive& drive : drives_) {
+      double& sent = sent_[drive.velocity];
+      const JointSituation joint{q()[drive.position], v()[drive.velocity], sent, part.duration};
+      sent = LimitEffort(wish[drive.velocity], joint, drive.limits).value_or(0);
     }
     simulator_.Prepare(sent_, part.duration);
     if (corrected_) mean_effort_ += part.duration / period_ * sent_;

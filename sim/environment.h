@@ -54,8 +54,7 @@ class Environment {
   void SetResidual(std::shared_ptr<const Residual> residual, size_t draw = 0);
   /// From now on efforts come through the robot's driver, which limits them in each of its cycles
   /// by what the joint is doing then (LimitEffort): against a stop there are none, say. Else
-  /// actions act as they are, as gym's do. Not for robots with spherical joints, which have no
-  /// limits.
+  /// actions act as they are, as gym's do.
   void SendThroughDriver();
   /// Draws a state of the task's initial distribution. No effort has been applied yet.
   void Reset(Random& random);
@@ -111,7 +110,11 @@ class Environment {
   int steps_per_episode_;
   double period_;
   double latency_;
-  std::vector<std::optional<JointLimits>> limits_;  // the driver's, of each velocity; empty: none
+  struct Drive {
+    Eigen::Index position, velocity;  // in q and v
+    JointLimits limits;
+  };
+  std::vector<Drive> drives_;  // that the driver limits
   std::vector<Part> parts_;
   // work space of Reset and Step: where an episode or a step begins
   Eigen::VectorXd start_q_, start_v_;

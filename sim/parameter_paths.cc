@@ -62,22 +62,32 @@ std::vector<ParameterPath> ParameterPaths(const RobotDescription& description,
   return paths;
 }
 
-const ParameterPath& FindPath(const std::vector<ParameterPath>& paths, const std::string& path,
-                              const std::string& file) {
+std::vector<ParameterPath> FindPaths(const std::vector<ParameterPath>& paths,
+                                     const std::string& name, const std::set<std::string>& named,
+                                     const std::string& file) {
+  const std::string where = file.empty() ? "" : file + ": [[parameter]]: ";
+  std::vector<ParameterPath> found;
   std::vector<std::string> names;
   for (const ParameterPath& candidate : paths) {
-    if (candidate.path == path) return candidate;
+    if (candidate.path == name) return {candidate};
+    if (Covers(name, candidate.path) && !named.contains(candidate.path)) found.push_back(candidate);
     names.push_back(candidate.path);
   }
+  for (const ParameterPath& path : found) {
+    if (path.joint != found[0].joint || path.link != found[0].link) {
+      throw std::invalid_argument(where + "'" + name + "' is '" + found[0].path + "' and '" +
+                                  path.path + "': one number cannot be both");
+    }
+  }
+  if (!found.empty()) return found;
   std::string why;
-  if (path.starts_with("contact/"))
+  if (name.starts_with("contact/"))
     why = " (contact needs [simulation.contact] and collision shapes)";
-  if (path.starts_with("limit/")) why = " (stops need [simulation.limit])";
-  if (path.starts_with("length/"))
+  if (name.starts_with("limit/")) why = " (stops need [simulation.limit])";
+  if (name.starts_with("length/"))
     why = " (a link whose joints and centre of mass coincide has no length)";
-  const std::string where = file.empty() ? "" : file + ": [[parameter]]: ";
-  throw std::invalid_argument(where + "the simulator has no parameter '" + path + "'" + why +
-                              "; the nearest is '" + NearestName(path, names) + "'");
+  throw std::invalid_argument(where + "the simulator has no parameter '" + name + "'" + why +
+                              "; the nearest is '" + NearestName(name, names) + "'");
 }
 
 }  // namespace plumb

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -30,9 +31,11 @@ struct ParameterPath {
 std::vector<ParameterPath> ParameterPaths(const RobotDescription& description,
                                           const Physics<double>& physics);
 
-/// The one of that path. @throws std::invalid_argument naming the nearest if there is none, and, if
-/// it is known, the robot's file.
-const ParameterPath& FindPath(const std::vector<ParameterPath>& paths, const std::string& path,
-                              const std::string& file);
+/// The one of that name, or all that it covers (robot/parameters.h) and that are not in `named`:
+/// those that another parameter names in full. @throws std::invalid_argument naming the nearest if
+/// there is none, if they are of several kinds, and, if it is known, the robot's file.
+std::vector<ParameterPath> FindPaths(const std::vector<ParameterPath>& paths,
+                                     const std::string& name, const std::set<std::string>& named,
+                                     const std::string& file);
 
 }  // namespace plumb

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <set>
 #include <stdexcept>
 
 #include "robot/contact_points.h"
@@ -86,19 +88,40 @@ Parameters::Parameters(const RobotDescription& description, const Topology& topo
     }
   }
 
+  FindPathsOf(description);
+  FindTerms(description);
+}
+
+void Parameters::FindPathsOf(const RobotDescription& description) {
   const std::vector<ParameterPath> all = ParameterPaths(description, base_);
-  for (const ParameterDescription& parameter : description.parameters) {
-    const auto index = static_cast<int>(paths_.size());
-    paths_.push_back(FindPath(all, parameter.name, description.file));
-    means_[index] = parameter.mean;
-    if (IsCholesky(paths_.back())) AddCholesky(paths_.back(), index, 0);
+  std::set<std::string> named;
+  for (const ParameterDescription& parameter : description.parameters) named.insert(parameter.name);
+  for (const FrozenParameter& parameter : description.frozen) named.insert(parameter.name);
+  std::map<std::string, std::string> given;  // by which parameter
+  const auto find = [&](const std::string& name) {
+    std::vector<ParameterPath> paths = FindPaths(all, name, named, description.file);
+    for (const ParameterPath& path : paths) {
+      const auto [other, is_new] = given.try_emplace(path.path, name);
+      if (is_new) continue;
+      throw std::invalid_argument(description.file + ": [[parameter]]: '" + other->second +
+                                  "' and '" + name + "' both give '" + path.path + "'");
+    }
+    return paths;
+  };
+  for (size_t i = 0; i < description.parameters.size(); ++i) {
+    const auto parameter = static_cast<int>(i);
+    means_[parameter] = description.parameters[i].mean;
+    for (const ParameterPath& path : find(description.parameters[i].name)) {
+      uncertain_.push_back({path, parameter});
+      if (IsCholesky(path)) AddCholesky(path, parameter, 0);
+    }
   }
   for (const FrozenParameter& parameter : description.frozen) {
-    const ParameterPath& path = FindPath(all, parameter.name, description.file);
-    Check(path.path, path.values, parameter.value);
-    Freeze(path, parameter.value);
+    for (const ParameterPath& path : find(parameter.name)) {
+      Check(path.path, path.values, parameter.value);
+      Freeze(path, parameter.value);
+    }
   }
-  FindTerms(description);
 }
 
 void Parameters::Check(const std::string& path, Range values, double value) {
@@ -135,9 +158,9 @@ void Parameters::FindTerms(const RobotDescription& description) {
     const auto has = [&](const JointDynamics& axis) {
       return axis.*kind.member != kDefault.*kind.member;
     };
-    const auto may_have = [&](const ParameterPath& path) { return path.joint == &kind; };
+    const auto may_have = [&](const Uncertain& one) { return one.path.joint == &kind; };
     terms_.joints[i] = std::any_of(base_.axes.begin(), base_.axes.end(), has) ||
-                       std::any_of(paths_.begin(), paths_.end(), may_have);
+                       std::any_of(uncertain_.begin(), uncertain_.end(), may_have);
   }
   terms_.stops = description.simulation.stop.has_value();
 }
@@ -154,13 +177,12 @@ void Parameters::Apply(const Eigen::Ref<const Eigen::VectorXd>& physical,
     throw std::invalid_argument("the simulator has " + std::to_string(size()) +
                                 " parameters, not " + std::to_string(physical.size()));
   }
-  const auto path = [&](int i) -> const ParameterPath& { return paths_[static_cast<size_t>(i)]; };
-  for (int i = 0; i < size(); ++i) Check(path(i).path, path(i).values, physical[i]);
+  for (const auto& [path, i] : uncertain_) Check(path.path, path.values, physical[i]);
   *physics = base_;  // equal sizes: copies values, does not allocate
-  for (int i = 0; i < size(); ++i) Set(path(i), physical[i], physics);
+  for (const auto& [path, i] : uncertain_) Set(path, physical[i], physics);
   for (const Inertia& inertia : inertias_) SetInertia(inertia, physical, physics);
   for (const Fixed& fixed : factors_) Scale(fixed.path, fixed.value, physics);
-  for (int i = 0; i < size(); ++i) Scale(path(i), physical[i], physics);
+  for (const auto& [path, i] : uncertain_) Scale(path, physical[i], physics);
 }
 
 void Parameters::Set(const ParameterPath& path, double value, Physics<double>* physics) const {

@@ -32,6 +32,10 @@ namespace plumb {
 ///   contact/<kind>, limit/<kind>
 ///                           those of kWorldParameterKinds, as in SimulationSettings
 ///
+/// A name with a wildcard is one number for all paths of a kind that it covers
+/// (robot/parameters.h), but for those that another parameter names in full: legs are built alike,
+/// and mass/*_thigh is learnt from all of them.
+///
 /// Only inertias that a body can have can be expressed. With S = tr(I)/2 - I, the second moment of
 /// mass about the centre (I is physical exactly where S is positive semidefinite: Wensing, Kim,
 /// Slotine, RA-L 3, 2018), and L L^T that of the URDF's inertia in link axes,
@@ -44,10 +48,10 @@ namespace plumb {
 class Parameters {
  public:
   /// @throws std::invalid_argument for a path that is none of the above, naming the nearest that
-  /// is, or a value that is not physical.
+  /// is, one that two parameters give, or a value that is not physical.
   Parameters(const RobotDescription& description, const Topology& topology);
 
-  int size() const { return static_cast<int>(paths_.size()); }
+  int size() const { return static_cast<int>(means_.size()); }
   /// Prior means, physical units.
   const Eigen::VectorXd& means() const { return means_; }
   /// The robot with its frozen parameters and the prior means of the uncertain ones.
@@ -67,6 +71,10 @@ class Parameters {
   void Apply(const Eigen::Ref<const Eigen::VectorXd>& physical, Physics<double>* physics) const;
 
  private:
+  struct Uncertain {
+    ParameterPath path;
+    int parameter;  // index
+  };
   struct Fixed {
     ParameterPath path;
     double value;
@@ -78,6 +86,7 @@ class Parameters {
     std::array<double, 6> value;
   };
 
+  void FindPathsOf(const RobotDescription& description);
   static void Check(const std::string& path, Range values, double value);
   void Freeze(const ParameterPath& path, double value);
   void AddCholesky(const ParameterPath& path, int parameter, double value);
@@ -93,8 +102,8 @@ class Parameters {
   std::vector<Eigen::Vector3d> centers_;    // of mass, in the link frame
   std::vector<Eigen::Matrix3d> roots_;      // L of each link, in working axes
   Physics<double> base_;                    // the files, and what is frozen and not a factor
-  std::vector<ParameterPath> paths_;        // of the uncertain parameters
-  std::vector<Fixed> factors_;              // frozen
+  std::vector<Uncertain> uncertain_;
+  std::vector<Fixed> factors_;  // frozen
   std::vector<Inertia> inertias_;
   Eigen::VectorXd means_;
   Terms terms_;

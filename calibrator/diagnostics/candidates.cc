@@ -81,13 +81,15 @@ std::vector<Candidate> FindCandidates(const RobotDescription& robot) {
   }
   for (size_t i = 1; i < robot.links.size(); ++i) AddLink(robot.links[i], &all);
   for (const JointDescription& joint : robot.joints) AddJoint(joint, LargestEffort(robot), &all);
-  for (const FrozenParameter& frozen : robot.frozen) {
-    for (Candidate& candidate : all) {
-      if (candidate.path == frozen.name) candidate.value = frozen.value;
+  for (Candidate& candidate : all) {
+    for (const FrozenParameter& frozen : robot.frozen) {
+      if (!Covers(frozen.name, candidate.path)) continue;
+      candidate.value = frozen.value;
+      if (frozen.name == candidate.path) break;
     }
   }
   std::erase_if(all, [&](const Candidate& candidate) {
-    return robot.FindParameter(candidate.path) >= 0 || !(candidate.scale > 0);
+    return robot.IsUncertain(candidate.path) || !(candidate.scale > 0);
   });
   return all;
 }

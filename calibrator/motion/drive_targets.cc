@@ -33,7 +33,7 @@ DriveTargets::DriveTargets(const CsvReader& table, const RobotDescription& robot
                       column));
     }
     for (const char* kind : {"kp/", "rest/"}) {
-      if (robot.FindParameter(kind + joint.name) >= 0)
+      if (robot.IsUncertain(kind + joint.name))
         table.Fail(
             fmt::format("{}: {}{} is an uncertain parameter: which effort a target is "
                         "nobody knows",

@@ -47,38 +47,42 @@ struct Value {
   bool in_urdf;
 };
 
-/// The attribute of <dynamics> that a parameter is; null if it is none.
-const char* DynamicsAttribute(const std::string& name) {
-  const std::string kind = name.substr(0, name.find('/'));
-  for (const JointParameterKind& of_joint : kJointParameterKinds) {
-    if (of_joint.in_urdf && kind == of_joint.name) return of_joint.key;
-  }
-  return nullptr;
-}
-
 class Placement {
  public:
-  Placement(const Toml& toml, const UrdfModel& file) : toml_(toml), file_(file) {}
+  Placement(const RobotDescription& robot, const Toml& toml, const UrdfModel& file)
+      : toml_(toml), file_(file) {
+    for (const ParameterDescription& parameter : robot.parameters) named_.insert(parameter.name);
+    for (const FrozenParameter& parameter : robot.frozen) named_.insert(parameter.name);
+  }
 
   bool InUrdf(const std::string& name) const {
     const std::string kind = name.substr(0, name.find('/'));
     for (const LinkParameterKind& of_link : kLinkParameterKinds) {
       if (kind == of_link.name) return true;
     }
-    return DynamicsAttribute(name) && InDynamics(name);
+    for (const JointParameterKind& of_joint : kJointParameterKinds) {
+      if (of_joint.in_urdf && kind == of_joint.name) return InDynamics(name);
+    }
+    return false;
   }
 
  private:
-  // The parts of a planar or floating joint share one <dynamics>.
+  // Of all that it gives. The parts of a planar or floating joint share one <dynamics>.
   bool InDynamics(const std::string& name) const {
-    const std::string joint = name.substr(name.find('/') + 1);
-    const auto found = std::find_if(file_.joints.begin(), file_.joints.end(),
-                                    [&](const auto& j) { return j.name == joint; });
-    return found != file_.joints.end() && !found->part && toml_.dynamics.count(name) == 0;
+    const std::string kind = name.substr(0, name.find('/') + 1);
+    int here = 0, elsewhere = 0;
+    for (const auto& joint : file_.joints) {
+      const std::string path = kind + joint.name;
+      if (name != path && (!Covers(name, path) || named_.contains(path))) continue;
+      const bool other = joint.part || toml_.dynamics.contains(path);
+      ++(other ? elsewhere : here);
+    }
+    return here > 0 && elsewhere == 0;
   }
 
   const Toml& toml_;
   const UrdfModel& file_;
+  std::set<std::string> named_;  // in full, among others
 };
 
 std::vector<Value> AllValues(const RobotDescription& robot, const Eigen::VectorXd& mean,
@@ -94,18 +98,27 @@ std::vector<Value> AllValues(const RobotDescription& robot, const Eigen::VectorX
   return values;
 }
 
+/// The parameter that gives what is at a path, the one that names it in full or one that covers it;
+/// null if none does.
+const Value* ValueOf(const std::string& path, const std::vector<Value>& values) {
+  const Value* found = nullptr;
+  for (const Value& value : values) {
+    if (value.name == path) return &value;
+    if (Covers(value.name, path)) found = &value;
+  }
+  return found;
+}
+
 // How much longer a link gets: see length/ in sim/parameters.h.
 double StretchOf(const UrdfModel& file, size_t link, const std::vector<Value>& values) {
-  const auto value = std::find_if(values.begin(), values.end(), [&](const Value& v) {
-    return v.name == "length/" + file.links[link].name;
-  });
-  if (value == values.end()) return 1;
+  const Value* value = ValueOf("length/" + file.links[link].name, values);
+  if (!value) return 1;
   const auto child = std::find_if(file.joints.begin(), file.joints.end(), [&](const auto& joint) {
     return joint.parent == static_cast<int>(link);
   });
   const double length = child == file.joints.end() ? 2 * file.links[link].center_of_mass.norm()
                                                    : child->origin.norm();
-  return value->mean / length;
+  return length > 0 ? value->mean / length : 1;  // "length/*" is not for links that have none
 }
 
 std::string Quoted(const std::string& text) {
@@ -160,13 +173,17 @@ std::string IdentifiedUrdf(const RobotDescription& robot, const Eigen::VectorXd&
   }
   const Toml toml = ReadToml(robot);
   const UrdfModel file = LoadUrdf(toml.urdf, toml.fixed);
-  const std::vector<Value> values = AllValues(robot, mean, sd, Placement(toml, file));
+  const std::vector<Value> values = AllValues(robot, mean, sd, Placement(robot, toml, file));
   UrdfNumbers writer(ReadFile(toml.urdf), file, now);
   for (size_t i = 1; i < file.links.size(); ++i) writer.WriteLink(i, StretchOf(file, i, values));
   for (const Value& v : values) {
-    const char* attribute = DynamicsAttribute(v.name);
-    if (v.in_urdf && attribute)
-      writer.WriteDynamics(v.name.substr(v.name.find('/') + 1), attribute, v.mean);
+    for (const JointParameterKind& kind : kJointParameterKinds) {
+      if (!kind.in_urdf || !v.in_urdf) continue;
+      for (const auto& joint : file.joints) {
+        if (ValueOf(std::string(kind.name) + "/" + joint.name, values) == &v)
+          writer.WriteDynamics(joint.name, kind.key, v.mean);
+      }
+    }
   }
   writer.AddComment(UrdfComment(robot, values, residual));
   return writer.Print();

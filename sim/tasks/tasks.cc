@@ -6,6 +6,7 @@
 #include "sim/tasks/hopper.h"
 #include "sim/tasks/pendulum.h"
 #include "sim/tasks/reach.h"
+#include "sim/tasks/stand.h"
 #include "sim/tasks/task.h"
 #include "sim/tasks/walk.h"
 
@@ -27,6 +28,7 @@ constexpr struct {
     {"hold", Make<HoldTask>},          // stay near a target
     {"balance", Make<BalanceTask>},    // and do not fall
     {"walk", Make<WalkTask>},          // on legs, at a commanded velocity
+    {"stand", Make<StandTask>},        // on legs, after having been set down askew
 };
 
 }  // namespace

@@ -68,15 +68,15 @@ Eigen::Quaterniond Orientation(const Task::State& q) {
 
 }  // namespace
 
-WalkTask::WalkTask(const RobotDescription& description)
+WalkTask::WalkTask(const RobotDescription& description, const std::string& name,
+                   const Eigen::Vector3d& command)
     : Task(description, ObservationNames(description), StateScale(description)),
-      command_(description.task.velocity.data()),
+      command_(command),
       period_(description.task.period),
       height_(0) {
   if (!IsLegged(description)) {
     throw std::invalid_argument(
-        "task 'walk' needs a floating base without motors, then turning "
-        "joints with; '" +
+        "task '" + name + "' needs a floating base without motors, then turning joints with; '" +
         description.name + "' has others");
   }
   const auto driven = static_cast<Eigen::Index>(action_size());

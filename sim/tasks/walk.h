@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <string>
 #include <vector>
 
 #include "sim/tasks/task.h"
@@ -26,7 +27,8 @@ class WalkTask : public Task {
  public:
   /// @throws std::invalid_argument unless the robot has three slides along x, y, z and a spherical
   /// joint without motors, then turning joints with.
-  explicit WalkTask(const RobotDescription& description);
+  explicit WalkTask(const RobotDescription& description)
+      : WalkTask(description, "walk", Eigen::Vector3d(description.task.velocity.data())) {}
 
   void Observe(const State& q, const State& v, std::span<float> observation) const override;
   double Reward(const State& q, const State& v, const State& effort, const State& next_q,
@@ -35,11 +37,19 @@ class WalkTask : public Task {
   void InitialState(Random& random, Eigen::Ref<Eigen::VectorXd> q,
                     Eigen::Ref<Eigen::VectorXd> v) const override;
 
+ protected:
+  WalkTask(const RobotDescription& description, const std::string& name,
+           const Eigen::Vector3d& command);
+
+  /// [m] of the trunk, its feet on the ground and its joints at rest.
+  double standing_height() const { return height_; }
+  const Eigen::VectorXd& rest() const { return rest_; }  ///< [rad] of the driven joints
+
  private:
   Eigen::Vector3d command_;
   double period_;
-  double height_;         ///< [m] of the trunk, its feet on the ground and its joints at rest
-  Eigen::VectorXd rest_;  ///< of the driven joints
+  double height_;
+  Eigen::VectorXd rest_;
   struct Drive {
     JointDynamics dynamics;
     double effort_limit;

@@ -145,6 +145,36 @@ TEST_CASE("through a driver efforts against a stop do nothing, and those away fr
   CHECK(after(driven, -0.5f) == after(environment, -0.5f));
 }
 
+TEST_CASE("through a driver a quadruped's knee at its stop is not pushed into it") {
+  const RobotDescription robot = LoadRobot(SourceFile("robots/quadruped"));
+  Environment environment(robot), driven(robot);
+  driven.SendThroughDriver();
+  const auto& joints = robot.joints;
+  const auto knee =
+      static_cast<size_t>(std::find_if(joints.begin(), joints.end(),
+                                       [](const auto& j) { return j.name == "rear_left_knee"; }) -
+                          joints.begin());
+  VectorXd q = VectorXd::Zero(19);
+  q[2] = 2, q[3] = 1;  // in the air
+  for (size_t i = 4; i < joints.size(); ++i)
+    q[static_cast<Eigen::Index>(i) + 3] = joints[i].dynamics.rest;
+  q[static_cast<Eigen::Index>(knee) + 3] = joints[knee].upper + 0.001;
+  const auto after = [&](Environment& one, float action) {
+    Eigen::VectorXf actions = Eigen::VectorXf::Zero(12);
+    actions[static_cast<Eigen::Index>(knee) - 4] = action;
+    one.SetState(q, VectorXd::Zero(18));
+    for (int step = 0; step < 5; ++step) one.Step(actions);
+    return one.q()[static_cast<Eigen::Index>(knee) + 3];
+  };
+  // 32 Nm: more than the spring of its drive, which would bring it back.
+  const double pushed = after(environment, 0.9f), limited = after(driven, 0.9f),
+               free = after(environment, 0);
+  CHECK(pushed > joints[knee].upper + 0.001);
+  CHECK(limited < pushed - 0.01);
+  CHECK(limited > free);
+  CHECK(after(driven, -0.3f) == Approx(after(environment, -0.3f)).margin(0.02));  // other substeps
+}
+
 TEST_CASE("a driver looks at a joint in each of its cycles") {
   const RobotDescription robot = LoadRobot(SourceFile("robots/hopper/robot.toml"));
   Environment driven(robot);

@@ -69,6 +69,49 @@ TEST_CASE("an unknown parameter is answered with the nearest known one") {
                     Catch::Contains("[simulation.limit]"));
 }
 
+TEST_CASE("a parameter with a wildcard is one number for all that it covers but what is named") {
+  const RobotDescription robot = LoadRobot(SourceFile("robots/quadruped"));
+  const RobotDescription set = Describe(
+      robot, {"mass/*_thigh", "friction/front_*", "friction/front_left_knee", "inertia/*_calf/xx"},
+      Eigen::Vector4d(1.3, 0.4, 0.7, 0.1));
+  const RobotDescription one_by_one =
+      Describe(robot, {"inertia/front_left_calf/xx", "inertia/rear_right_calf/xx"},
+               Eigen::Vector2d(0.1, 0.1));
+  for (size_t i = 1; i < robot.links.size(); ++i) {
+    const std::string& name = robot.links[i].name;
+    const bool thigh = name.ends_with("_thigh"), calf = name.ends_with("_calf");
+    const double factor = 1.3 / robot.links[i].mass;
+    CHECK(set.links[i].mass == (thigh ? 1.3 : robot.links[i].mass));
+    if (thigh) CHECK(set.links[i].inertia.isApprox(factor * robot.links[i].inertia, 1e-14));
+    CHECK((set.links[i].inertia == robot.links[i].inertia) == !(thigh || calf));
+    if (name == "front_left_calf" || name == "rear_right_calf")
+      CHECK(set.links[i].inertia.isApprox(one_by_one.links[i].inertia, 1e-14));
+  }
+  for (size_t i = 4; i < robot.joints.size(); ++i) {
+    const std::string& name = robot.joints[i].name;
+    const double covered = name == "front_left_knee" ? 0.7 : 0.4;
+    CHECK(set.joints[i].dynamics.friction == (name.starts_with("front_") ? covered : 0.2));
+  }
+  CHECK_THROWS_WITH(Model(WithParameters(robot, {"mass/*_hip", "mass/front_*"})),
+                    Catch::Contains("'mass/*_hip' and 'mass/front_*' both give"));
+  CHECK_THROWS_WITH(Model(WithParameters(robot, {"*/front_left_hip"})),
+                    Catch::Contains("one number cannot be both"));
+  CHECK_THROWS_WITH(Model(WithParameters(robot, {"mass/*_arm"})),
+                    Catch::Contains("has no parameter 'mass/*_arm'"));
+}
+
+TEST_CASE("what is frozen may have a wildcard, too, and who is named in full keeps its own value") {
+  RobotDescription robot =
+      WithParameters(LoadRobot(SourceFile("robots/quadruped")), {"armature/rear_left_hip"});
+  robot.frozen = {{"armature/*_hip", 0.02}, {"armature/front_left_hip", 0.03}};
+  const RobotDescription set = Model(robot).Describe(VectorXd::Constant(1, 0.04));
+  for (size_t i = 4; i < robot.joints.size(); ++i) {
+    const std::string& name = robot.joints[i].name;
+    const double hip = name == "rear_left_hip" ? 0.04 : name == "front_left_hip" ? 0.03 : 0.02;
+    CHECK(set.joints[i].dynamics.armature == (name.ends_with("_hip") ? hip : 0.01));
+  }
+}
+
 TEST_CASE("the base's mass is a parameter without any effect") {
   Simulator with(WithParameters(LoadPendulum("robot.toml"), {"mass/base"}));
   Simulator without(WithParameters(LoadPendulum("robot.toml"), {}));

@@ -20,7 +20,13 @@ namespace {
 
 constexpr int kQ = 19, kV = 18;
 
-RobotDescription Quadruped() { return LoadRobot(SourceFile("robots/quadruped")); }
+/// Of which nothing is uncertain but the trunk's mass.
+RobotDescription Quadruped() {
+  RobotDescription robot = LoadRobot(SourceFile("robots/quadruped"));
+  robot.parameters.resize(1);
+  robot.virtual_robot.hidden.resize(1);
+  return robot;
+}
 
 robot_state_t QuadrupedState(int64_t sequence) {
   robot_state_t s{};

@@ -176,6 +176,16 @@ TEST_CASE("in any order and alone, parameters give the same") {
                        Contains("name = \"damping/hinge\""));
 }
 
+TEST_CASE("one number for several parts is written to each, but to what is named in full") {
+  CheckPhysics("hopper", {{"mass/[lt]*", 2.5}, {"length/*", 0.6}, {"mass/leg", 2}});
+  CHECK_THAT(CheckPhysics("cartpole", {{"friction/*", 0.3}, {"friction/cart", 0.1}}),
+             Contains("<dynamics friction=\"0.3\"/>"));
+  // Of one of them robot.toml has it: then that is where it goes.
+  const RobotDescription cartpole = LoadRobot(Source("cartpole"));
+  CHECK_THAT(Identified(cartpole, {{"damping/*", 0.02}}),
+             Contains("name = \"damping/*\"") && !Contains("<dynamics damping"));
+}
+
 TEST_CASE("links welded together, planar and floating joints: the physics is right, too") {
   // foot is welded to slider at a right angle, and carries all of its mass.
   const std::vector<NewValue> values{{"mass/slider", 0.2},      {"com/slider/x", 0.01},

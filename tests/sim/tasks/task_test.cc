@@ -92,8 +92,8 @@ TEST_CASE(
   RobotDescription description = LoadPendulum("robot.toml");
   description.task.name = "pendulun";
   CHECK_THROWS_WITH(MakeTask(description), Catch::Contains("'pendulum'"));
-  CHECK(TaskNames() ==
-        std::vector<std::string>{"pendulum", "hopper", "reach", "hold", "balance", "walk"});
+  CHECK(TaskNames() == std::vector<std::string>{"pendulum", "hopper", "reach", "hold", "balance",
+                                                "walk", "stand"});
   RobotDescription tree = MakeTree();
   CHECK_THROWS_AS(MakeTask(tree), std::invalid_argument);
 }

@@ -1,5 +1,6 @@
 #include "sim/tasks/walk.h"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 
@@ -104,6 +105,41 @@ TEST_CASE("walk: an episode begins on the feet, and ends with a fall") {
   CHECK_FALSE(task->Terminated(leaning.q, leaning.v));
   lying.q[2] = std::nan("");
   CHECK(task->Terminated(lying.q, lying.v));
+}
+
+TEST_CASE("stand: is paid as walking nowhere, and begins above the ground, askew") {
+  RobotDescription robot = LoadRobot(SourceFile("robots/quadruped"));
+  robot.task.name = "stand";
+  CHECK_THROWS_WITH(MakeTask(robot), Catch::Contains("velocity is for 'walk'"));
+  robot.task.velocity = {0, 0, 0};
+  const auto stand = MakeTask(robot);
+  robot.task.name = "walk";
+  const auto walk = MakeTask(robot);
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(18);
+  const WalkState still = Going(robot, 0.3, 0, 0), going = Going(robot, 0.3, 0.2, 0.1);
+  CHECK(stand->Reward(still.q, still.v, none, still.q, still.v) == Approx(1.5).epsilon(1e-12));
+  CHECK(stand->Reward(still.q, still.v, none, going.q, going.v) ==
+        walk->Reward(still.q, still.v, none, going.q, going.v));
+  Random random(3);
+  WalkState start;
+  double most = 0, highest = 0;
+  for (int i = 0; i < 200; ++i) {
+    stand->InitialState(random, start.q, start.v);
+    CHECK_FALSE(stand->Terminated(start.q, start.v));
+    CHECK(start.q.segment<4>(3).norm() == Approx(1).epsilon(1e-12));
+    const Eigen::Quaterniond trunk(start.q[3], start.q[4], start.q[5], start.q[6]);
+    most = std::max(most, std::acos((trunk * Eigen::Vector3d::UnitZ()).z()));
+    double lowest = 1;
+    const std::vector<Pose> poses = LinkPoses(robot, start.q);
+    for (const ContactPoint& point : ContactPoints(robot)) {
+      const Pose& pose = poses[static_cast<size_t>(point.link)];
+      lowest = std::min(lowest, (pose.position + pose.rotation * point.centre).z() - point.radius);
+    }
+    CHECK(lowest > -0.03);
+    highest = std::max(highest, lowest);
+  }
+  CHECK((most > 0.1 && most < 0.15));
+  CHECK(highest > 0);
 }
 
 TEST_CASE("walk: a robot without a free trunk is refused") {
