@@ -56,6 +56,7 @@ BaseObserver::BaseObserver(const RobotDescription& robot)
       reset_after_(robot.estimator.reset_after),
       measured_angle_sd_(robot.sensors[base_.imu].noise.position_sd),
       rate_sd_(robot.sensors[base_.imu].noise.velocity_sd),
+      creep_(robot.estimator.creep),
       odometry_(SettingsOf(robot, base_), points_.size()),
       smoother_(points_.size(), ReadingsIn(robot, base_)),
       kinematics_(robot),
@@ -100,6 +101,12 @@ void BaseObserver::LookAtLegs() {
       foot.velocity_variance += legs_.v_variance[k] * lever * lever.transpose();
     }
   }
+}
+
+// Of the velocity: what all feet do alike, neither they nor the IMU tell. The filter does not know
+// of it, as it would take it for noise that averages out.
+double BaseObserver::CreepSd(const Vector3d& direction) const {
+  return creep_ * direction.head<2>().norm();
 }
 
 double BaseObserver::AngleOf(const Eigen::Quaterniond& orientation) const {
@@ -211,7 +218,7 @@ void BaseObserver::Fill(int64_t utime, robot_state_t& state) const {
             ahead * ahead / 2 * acceleration,
         velocity + ahead * acceleration,
         std::hypot(odometry_.position_sd(along), ahead * velocity_sd, ahead / 2 * change),
-        std::hypot(velocity_sd, change), state);
+        std::hypot(velocity_sd, change, CreepSd(along)), state);
   }
   const Vector3d rates = odometry_.rate();
   if (base_.spatial) {
@@ -242,7 +249,8 @@ void BaseObserver::Smooth(int64_t utime, robot_state_t& state) {
     const Vector3d& along = slide.direction;
     Set(slide.joint, along.dot(motion->position - base_.zero.position), along.dot(motion->velocity),
         sd(LegOdometry::kPosition, along),
-        std::hypot(sd(LegOdometry::kVelocity, along), motion->acceleration_change), state);
+        std::hypot(sd(LegOdometry::kVelocity, along), motion->acceleration_change, CreepSd(along)),
+        state);
   }
   const auto rate_sd = [&](const Vector3d& axis) {
     return std::hypot(rate_sd_, sd(LegOdometry::kRateBias, axis), motion->rate_change);

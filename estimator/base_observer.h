@@ -55,6 +55,7 @@ class BaseObserver {
 
  private:
   void LookAtLegs();
+  double CreepSd(const Eigen::Vector3d& direction) const;
   double AngleOf(const Eigen::Quaterniond& orientation) const;
   double TiltSd() const;
   void Set(int joint, double q, double v, double q_sd, double v_sd, robot_state_t& state) const;
@@ -71,6 +72,7 @@ class BaseObserver {
   double reset_after_;        // [rad]
   double measured_angle_sd_;  // [rad] of the IMU's own orientation
   double rate_sd_;            // [rad/s] of the gyro
+  double creep_;              // [m/s]
   LegOdometry odometry_;
   LegSmoother smoother_;
   Kinematics kinematics_;

@@ -10,7 +10,7 @@ namespace plumb {
 Environment::Environment(const RobotDescription& description)
     : Environment(std::make_shared<Model>(description)) {}
 
-Environment::Environment(std::shared_ptr<const Model> model)
+Environment::Environment(const std::shared_ptr<const Model>& model)
     : task_(MakeTask(model->description())),
       model_(model),
       simulator_(model),
@@ -35,9 +35,10 @@ void Environment::SendThroughDriver() {
   parts_.clear();
   for (const bool late : {false, true}) {
     double left = late ? period_ - latency_ : latency_;
-    for (double cycle = 0; left > kNothing; left -= cycle) {
-      cycle = left - robot.driver.cycle > kNothing ? robot.driver.cycle : left;
+    while (left > kNothing) {
+      const double cycle = left - robot.driver.cycle > kNothing ? robot.driver.cycle : left;
       parts_.push_back({cycle, late});
+      left -= cycle;
     }
   }
   drives_.clear();

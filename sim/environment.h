@@ -34,7 +34,7 @@ class Environment {
   /// @throws std::invalid_argument if the description names an unknown task or parameter.
   explicit Environment(const RobotDescription& description);
   /// The same for a model that workers share.
-  explicit Environment(std::shared_ptr<const Model> model);
+  explicit Environment(const std::shared_ptr<const Model>& model);
 
   int observation_size() const { return task_->observation_size(); }
   int action_size() const { return task_->action_size(); }

@@ -36,6 +36,7 @@ EstimatorSettings ReadEstimator(Config config, const RobotDescription& robot) {
     }
     s.ground_sd = config.Number("ground_sd", kSanePositive, s.ground_sd);
     s.slip = config.Number("slip", kSanePositive, s.slip);
+    s.creep = config.Number("creep", {0, 10}, s.creep);
   }
   config.Finish();
   return s;

@@ -34,7 +34,9 @@ struct EstimatorSettings {
   enum class Base { kSensors, kLegs };
   Base base = Base::kSensors;
   double ground_sd = 5e-3;  ///< [m] of kLegs: by which the ground is uneven and gives way
-  double slip = 0.01;       ///< [m/sqrt(s)] of kLegs: by which a foot that rests creeps
+  double slip = 0.01;  ///< [m/sqrt(s)] of kLegs: by which a foot that rests creeps, each its way
+  /// [m/s] of kLegs: at which all feet that rest may creep the same way, which nothing sees
+  double creep = 0;
   // Of an IMU on a link that the joint carries; 0: there is none.
   /// [m/s^2] of a slide's acceleration, averaged over a period of the IMU
   double acceleration_sd = 0;
