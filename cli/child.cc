@@ -24,6 +24,7 @@ Child::Child(std::string name, const std::vector<std::string>& arguments,
   const uintmax_t size = std::filesystem::file_size(log, none_yet);
   begins_ = none_yet ? 0 : size;
   std::vector<char*> argv;
+  argv.reserve(arguments.size() + 1);
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);
 

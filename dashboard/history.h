@@ -21,7 +21,7 @@ class History {
   /// Of a message: its fields `iteration` and `update`, 0 where there is only one of them.
   struct Step {
     int64_t iteration = 0, update = 0;
-    auto operator<=>(const Step&) const = default;
+    auto operator<=>(const Step&) const = default;  // NOLINT(modernize-use-nullptr): no pointer
   };
   struct Entry {
     uint64_t order;  ///< of arrival, among all topics
