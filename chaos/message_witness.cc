@@ -165,13 +165,13 @@ void MessageWitness::OnSaid(int64_t time, const lockstep_post_t& post, const std
     if (!Read(post, m)) return;
     NoteChange(time, "controller",
                fmt::format("policy {}: {} {}", m.policy_iteration,
-                           kPhases[static_cast<size_t>(m.phase)], m.reason));
+                           kPhases[static_cast<unsigned char>(m.phase)], m.reason));
     RequireFinite(time, channel, m);
     RequireRising(time, channel, m.policy_iteration);
   } else if (channel == "DRIVER_STATUS") {
     if (driver_status_t m; Read(post, m)) {
       NoteChange(time, "driver",
-                 std::string(kDriverStates[static_cast<size_t>(m.state)]) + " " + m.reason);
+                 std::string(kDriverStates[static_cast<unsigned char>(m.state)]) + " " + m.reason);
     }
   }
 }
