@@ -157,7 +157,7 @@ LaplaceFit Fit(RemoteErrors& errors, const Prior& prior, const RemoteModel& mode
     try {
       fit = FitLaplace(errors.Problem(), mode);
     } catch (const std::invalid_argument& error) {
-      const std::string theirs = model.last_error();
+      const std::string& theirs = model.last_error();
       throw std::invalid_argument(model.name() + ": " + error.what() +
                                   (theirs.empty() ? "" : "; it has said: " + theirs));
     }
@@ -173,7 +173,7 @@ LaplaceFit Fit(RemoteErrors& errors, const Prior& prior, const RemoteModel& mode
 Eigen::Index NextStatesSize(const RobotDescription& robot, std::span<const Log> logs) {
   size_t transitions = 0;
   for (const Log& log : logs) transitions += CountTransitions(log.rollouts);
-  return 2 * robot.num_velocities() * static_cast<Eigen::Index>(transitions);
+  return Eigen::Index{2} * robot.num_velocities() * static_cast<Eigen::Index>(transitions);
 }
 
 Findings CalibrateRemote(const RobotDescription& robot, std::span<const Log> logs,
