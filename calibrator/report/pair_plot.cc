@@ -181,7 +181,9 @@ class Pairs {
     constexpr double kInset = 10, kRule = 12, kLeast = 2.5;
     const Axis whole(low, high, X(row).from() + kInset, X(row).to() - kInset);
     const double at = Top(row) + kRule;
-    const auto pixel = [&](double value) { return whole.Pixel(std::clamp(value, low, high)); };
+    const auto pixel = [&, low = low, high = high](double value) {
+      return whole.Pixel(std::clamp(value, low, high));
+    };
     svg_.Line(whole.from(), at, whole.to(), at, "prior line");
     const double from = pixel(summary_.lower(i)), to = pixel(summary_.upper(i));
     const double width = std::max(kLeast, to - from);
