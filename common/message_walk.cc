@@ -83,7 +83,7 @@ class Walk {
   template <class T>
   bool Integer(int64_t* number) {
     return Take<std::make_unsigned_t<T>>([&](uint64_t bits) {
-      constexpr int kUnused = 64 - 8 * sizeof(T);
+      constexpr int kUnused = std::is_signed_v<T> ? 64 - 8 * sizeof(T) : 0;
       *number = static_cast<int64_t>(bits << kUnused) >> kUnused;  // its first bit is the sign
       visitor_.Integer(*number);
     });
