@@ -56,9 +56,17 @@ int RobotDescription::FindParameter(const std::string& parameter) const {
   return -1;
 }
 
-bool RobotDescription::IsUncertain(const std::string& path) const {
-  return std::any_of(parameters.begin(), parameters.end(),
-                     [&](const ParameterDescription& p) { return Covers(p.name, path); });
+std::string RobotDescription::ParameterOf(const std::string& path) const {
+  std::string covering;
+  for (const ParameterDescription& parameter : parameters) {
+    if (parameter.name == path) return path;
+    if (Covers(parameter.name, path)) covering = parameter.name;
+  }
+  for (const FrozenParameter& parameter : frozen) {
+    if (parameter.name == path) return path;
+    if (Covers(parameter.name, path)) covering = parameter.name;
+  }
+  return covering;
 }
 
 namespace {

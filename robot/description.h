@@ -57,8 +57,10 @@ struct RobotDescription {
   Eigen::VectorXd ToPhysical(const Eigen::VectorXd& coordinates) const;
   /// Index of a parameter, -1 if there is none of that name.
   int FindParameter(const std::string& parameter) const;
-  /// Whether a parameter is what is at that path, or covers it.
-  bool IsUncertain(const std::string& path) const;
+  /// The name of the parameter, uncertain or frozen, that gives what is at a path: the path itself,
+  /// else a name that covers it; empty if there is none.
+  std::string ParameterOf(const std::string& path) const;
+  bool IsUncertain(const std::string& path) const { return FindParameter(ParameterOf(path)) >= 0; }
 };
 
 /// Reads a robot from a folder (its robot.toml) or from a TOML file. A relative path that is not

@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 #include <array>
 #include <memory>
-#include <optional>
 #include <span>
 #include <vector>
 

@@ -81,11 +81,9 @@ std::vector<Candidate> FindCandidates(const RobotDescription& robot) {
   }
   for (size_t i = 1; i < robot.links.size(); ++i) AddLink(robot.links[i], &all);
   for (const JointDescription& joint : robot.joints) AddJoint(joint, LargestEffort(robot), &all);
-  for (Candidate& candidate : all) {
-    for (const FrozenParameter& frozen : robot.frozen) {
-      if (!Covers(frozen.name, candidate.path)) continue;
-      candidate.value = frozen.value;
-      if (frozen.name == candidate.path) break;
+  for (const FrozenParameter& frozen : robot.frozen) {
+    for (Candidate& candidate : all) {
+      if (robot.ParameterOf(candidate.path) == frozen.name) candidate.value = frozen.value;
     }
   }
   std::erase_if(all, [&](const Candidate& candidate) {

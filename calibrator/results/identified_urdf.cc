@@ -50,10 +50,7 @@ struct Value {
 class Placement {
  public:
   Placement(const RobotDescription& robot, const Toml& toml, const UrdfModel& file)
-      : toml_(toml), file_(file) {
-    for (const ParameterDescription& parameter : robot.parameters) named_.insert(parameter.name);
-    for (const FrozenParameter& parameter : robot.frozen) named_.insert(parameter.name);
-  }
+      : robot_(robot), toml_(toml), file_(file) {}
 
   bool InUrdf(const std::string& name) const {
     const std::string kind = name.substr(0, name.find('/'));
@@ -73,16 +70,16 @@ class Placement {
     int here = 0, elsewhere = 0;
     for (const auto& joint : file_.joints) {
       const std::string path = kind + joint.name;
-      if (name != path && (!Covers(name, path) || named_.contains(path))) continue;
+      if (robot_.ParameterOf(path) != name) continue;
       const bool other = joint.part || toml_.dynamics.contains(path);
       ++(other ? elsewhere : here);
     }
     return here > 0 && elsewhere == 0;
   }
 
+  const RobotDescription& robot_;
   const Toml& toml_;
   const UrdfModel& file_;
-  std::set<std::string> named_;  // in full, among others
 };
 
 std::vector<Value> AllValues(const RobotDescription& robot, const Eigen::VectorXd& mean,
@@ -98,21 +95,13 @@ std::vector<Value> AllValues(const RobotDescription& robot, const Eigen::VectorX
   return values;
 }
 
-/// The parameter that gives what is at a path, the one that names it in full or one that covers it;
-/// null if none does.
-const Value* ValueOf(const std::string& path, const std::vector<Value>& values) {
-  const Value* found = nullptr;
-  for (const Value& value : values) {
-    if (value.name == path) return &value;
-    if (Covers(value.name, path)) found = &value;
-  }
-  return found;
-}
-
 // How much longer a link gets: see length/ in sim/parameters.h.
-double StretchOf(const UrdfModel& file, size_t link, const std::vector<Value>& values) {
-  const Value* value = ValueOf("length/" + file.links[link].name, values);
-  if (!value) return 1;
+double StretchOf(const RobotDescription& robot, const UrdfModel& file, size_t link,
+                 const std::vector<Value>& values) {
+  const std::string name = robot.ParameterOf("length/" + file.links[link].name);
+  const auto value =
+      std::find_if(values.begin(), values.end(), [&](const Value& v) { return v.name == name; });
+  if (value == values.end()) return 1;
   const auto child = std::find_if(file.joints.begin(), file.joints.end(), [&](const auto& joint) {
     return joint.parent == static_cast<int>(link);
   });
@@ -175,12 +164,13 @@ std::string IdentifiedUrdf(const RobotDescription& robot, const Eigen::VectorXd&
   const UrdfModel file = LoadUrdf(toml.urdf, toml.fixed);
   const std::vector<Value> values = AllValues(robot, mean, sd, Placement(robot, toml, file));
   UrdfNumbers writer(ReadFile(toml.urdf), file, now);
-  for (size_t i = 1; i < file.links.size(); ++i) writer.WriteLink(i, StretchOf(file, i, values));
+  for (size_t i = 1; i < file.links.size(); ++i)
+    writer.WriteLink(i, StretchOf(robot, file, i, values));
   for (const Value& v : values) {
     for (const JointParameterKind& kind : kJointParameterKinds) {
       if (!kind.in_urdf || !v.in_urdf) continue;
       for (const auto& joint : file.joints) {
-        if (ValueOf(std::string(kind.name) + "/" + joint.name, values) == &v)
+        if (robot.ParameterOf(std::string(kind.name) + "/" + joint.name) == v.name)
           writer.WriteDynamics(joint.name, kind.key, v.mean);
       }
     }

@@ -72,6 +72,22 @@ TEST_CASE("a joint that robot.toml holds must be one of the URDF's") {
   CHECK(LoadRobot(with("[]").path()).num_joints() == 1);
 }
 
+TEST_CASE("what a parameter names in full is not given by one that covers it") {
+  RobotDescription robot = LoadRobot(kPendulum);
+  robot.parameters = {{"friction/*_hip", "Nm", ParameterDescription::Coordinate::kLog, 1, 1},
+                      {"mass/trunk", "kg", ParameterDescription::Coordinate::kLog, 1, 1}};
+  robot.frozen = {{"friction/left_hip", 0.1}, {"mass/*", 1}};
+  CHECK(robot.ParameterOf("friction/right_hip") == "friction/*_hip");
+  CHECK(robot.ParameterOf("friction/left_hip") == "friction/left_hip");
+  CHECK(robot.ParameterOf("mass/trunk") == "mass/trunk");
+  CHECK(robot.ParameterOf("mass/calf") == "mass/*");
+  CHECK(robot.ParameterOf("friction/knee").empty());
+  CHECK(robot.IsUncertain("friction/right_hip"));
+  CHECK_FALSE(robot.IsUncertain("friction/left_hip"));
+  CHECK_FALSE(robot.IsUncertain("mass/calf"));
+  CHECK_FALSE(robot.IsUncertain("mass/a/b"));  // a wildcard does not reach beyond a slash
+}
+
 TEST_CASE("the hung quadruped is its legs alone") {
   const fs::path folder = fs::path(kPendulum).parent_path() / "quadruped";
   const RobotDescription whole = LoadRobot(folder), hung = LoadRobot(folder / "hung.toml");
