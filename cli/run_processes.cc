@@ -18,6 +18,21 @@ using SteadyClock = std::chrono::steady_clock;
 constexpr char kRobotProcess[] = "plumb-robot", kDriver[] = "plumb-driver",
                kRecorder[] = "plumb-record";
 
+// What a child says, in its log, from these words to the end of their line; nothing if it ends
+// before, or has not said so in time.
+std::string WaitForLine(Child& child, const char* words) {
+  constexpr double kPatience = 10;  // [s]
+  const auto start = SteadyClock::now();
+  while (child.running() && SecondsSince(start) < kPatience) {
+    const std::string log = child.Tail(10);
+    const size_t begin = log.find(words), end = log.find('\n', begin);
+    if (begin != std::string::npos && end != std::string::npos)
+      return log.substr(begin, end - begin);
+    child.WaitFor(0.02);
+  }
+  return "";
+}
+
 }  // namespace
 
 std::vector<std::string> RunProcesses::Command(const std::string& name,
@@ -39,7 +54,6 @@ void RunProcesses::Start(const std::string& name, std::vector<std::string> argum
 }
 
 std::string RunProcesses::StartDashboard() {
-  constexpr double kPatience = 10;  // [s]
   constexpr char kName[] = "plumb-dashboard", kSays[] = "dashboard: ";
   std::vector<std::string> arguments{flags_.robot, "--address", flags_.dashboard};
   for (const std::string& origin : flags_.origins)
@@ -47,14 +61,8 @@ std::string RunProcesses::StartDashboard() {
   if (coordinator_) arguments.push_back("--virtual");
   dashboard_.emplace(kName, Command(kName, arguments, coordinator_ ? "1" : where_.clock),
                      where_.output / (std::string(kName) + ".log"));
-  const auto start = SteadyClock::now();
-  while (dashboard_->running() && SecondsSince(start) < kPatience) {
-    const std::string log = dashboard_->Tail(10);
-    const size_t begin = log.find(kSays), end = log.find('\n', begin);
-    if (begin != std::string::npos && end != std::string::npos)
-      return log.substr(begin, end - begin);
-    dashboard_->WaitFor(0.02);
-  }
+  const std::string said = WaitForLine(*dashboard_, kSays);
+  if (!said.empty()) return said;
   const std::string why = dashboard_->Tail(1);
   return "no dashboard: " + why.substr(0, why.find_last_not_of(" \n") + 1);
 }
@@ -70,6 +78,7 @@ void RunProcesses::Start() {
   if (!flags_.log.empty() && !coordinator_) {
     Start(kRecorder,
           {"record", flags_.log, "--overwrite", "--robot", flags_.robot, "--note", flags_.command});
+    WaitForLine(children_.back(), "recording to ");  // what is said before it listens is lost
   }
   std::vector<std::string> virtual_robot{flags_.robot, "--seed", seed};
   std::vector<std::string> driver{flags_.robot, "--flight-recorder",
