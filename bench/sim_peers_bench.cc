@@ -70,8 +70,18 @@ Eigen::VectorXd Standing(const RobotDescription& robot) {
   return q;
 }
 
-void QuadrupedStep(benchmark::State& state) {
-  const RobotDescription robot = Quadruped();
+/// Whose feet may also touch each other and a step beside it.
+RobotDescription TouchingQuadruped() {
+  RobotDescription robot = Quadruped();
+  Shape step{.type = Shape::Type::kBox, .size = {1, 1, 0.1}};
+  step.position = {0.8, 0, 0.05};
+  robot.links[0].collisions = {step};
+  robot.simulation.link_pairs = {{"*_calf", "*_calf"}, {"world", "*_calf"}};
+  return robot;
+}
+
+void QuadrupedStep(benchmark::State& state, RobotDescription (*make)()) {
+  const RobotDescription robot = make();
   Simulator simulator(robot);
   const Eigen::VectorXd q = Standing(robot), none = Eigen::VectorXd::Zero(18);
   for (auto _ : state) {
@@ -80,10 +90,11 @@ void QuadrupedStep(benchmark::State& state) {
   }
   state.SetItemsProcessed(state.iterations() * 50);
 }
-BENCHMARK(QuadrupedStep);
+BENCHMARK_CAPTURE(QuadrupedStep, OnTheGround, Quadruped);
+BENCHMARK_CAPTURE(QuadrupedStep, WithPairs, TouchingQuadruped);
 
-void MujocoQuadrupedStep(benchmark::State& state) {
-  const RobotDescription robot = Quadruped();
+void MujocoQuadrupedStep(benchmark::State& state, RobotDescription (*make)()) {
+  const RobotDescription robot = make();
   const auto mujoco = MakeMujocoBackend(robot);
   const Eigen::VectorXd q = Standing(robot), none = Eigen::VectorXd::Zero(18);
   for (auto _ : state) {
@@ -92,7 +103,8 @@ void MujocoQuadrupedStep(benchmark::State& state) {
   }
   state.SetItemsProcessed(state.iterations() * 50);
 }
-BENCHMARK(MujocoQuadrupedStep);
+BENCHMARK_CAPTURE(MujocoQuadrupedStep, OnTheGround, Quadruped);
+BENCHMARK_CAPTURE(MujocoQuadrupedStep, WithPairs, TouchingQuadruped);
 
 void MujocoHopperMasses(benchmark::State& state) {
   MujocoHopper mujoco;

@@ -46,7 +46,7 @@ void RequireOutputs(const std::vector<std::string>& outputs,
 }
 
 std::vector<std::string> FilesOf(const RobotDescription& robot) {
-  std::vector<std::string> files;
+  std::vector<std::string> files = robot.meshes;
   Config root = Config::Load(robot.file, &files);
   const std::filesystem::path folder = std::filesystem::path(robot.file).parent_path();
   files.push_back((folder / root.Table("robot").String("urdf")).string());

@@ -43,6 +43,8 @@ Geometry GeometryOf(const Shape& shape, const Color& color) {
     case Shape::Type::kCapsule:
       set(Geometry::CAPSULE, 2);
       break;
+    case Shape::Type::kMesh:  // is a box here
+      break;
   }
   SetPose(shape.position, shape.rotation, geometry.position, geometry.quaternion);
   const double rgba[] = {color.red, color.green, color.blue, 1};

@@ -18,6 +18,8 @@
 #include "records/message_definitions.h"
 #include "robot/description.h"
 #include "robot/json_text.h"
+#include "robot/urdf/mesh.h"
+#include "robot/urdf/xml_edits.h"
 
 namespace plumb {
 namespace {
@@ -25,7 +27,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr char kRecord[] = "record.json", kToml[] = "robot.toml", kUrdf[] = "robot.urdf",
-               kDistribution[] = "parameter_distribution.json", kTypes[] = "lcmtypes";
+               kDistribution[] = "parameter_distribution.json", kTypes[] = "lcmtypes",
+               kMeshes[] = "meshes";
 
 std::string RecordJson(const std::string& log, const RecordFolder::About& about,
                        const std::string& robot_name) {
@@ -49,13 +52,32 @@ std::string RecordJson(const std::string& log, const RecordFolder::About& about,
 
 struct Robot {
   std::string name, toml, urdf;
+  std::map<std::string, std::string> meshes;  // by their names in the record
 };
 
+// The URDF, in which those of the robot's collision meshes that are read have names in the record.
+void ReadUrdf(const std::string& file, const std::vector<std::string>& meshes, Robot* robot) {
+  XmlEdits edits(ReadFile(file));
+  ForEachCollisionMesh(edits.root(), [&](const TiXmlElement& mesh) {
+    const char* named = mesh.Attribute("filename");
+    const std::string path = named ? FindMesh(named, file) : "";
+    const auto read = std::ranges::find(meshes, path);
+    if (read == meshes.end()) return;
+    const std::string name =
+        fmt::format("{}/{}{}", kMeshes, read - meshes.begin(), fs::path(path).extension().string());
+    if (robot->meshes.emplace(name, "").second) robot->meshes[name] = ReadFile(path);
+    edits.SetAttribute(mesh, "filename", name);
+  });
+  robot->urdf = edits.Print();
+}
+
 Robot ReadRobot(const std::string& folder_or_file) {
-  const RobotDescription robot = LoadRobot(folder_or_file);
-  const fs::path urdf =
-      fs::path(robot.file).parent_path() / Config::Load(robot.file).Table("robot").String("urdf");
-  return {robot.name, MergedToml(robot.file, "robot", "urdf", kUrdf), ReadFile(urdf.string())};
+  const RobotDescription description = LoadRobot(folder_or_file);
+  const fs::path urdf = fs::path(description.file).parent_path() /
+                        Config::Load(description.file).Table("robot").String("urdf");
+  Robot robot{description.name, MergedToml(description.file, "robot", "urdf", kUrdf), {}, {}};
+  ReadUrdf(urdf.string(), description.meshes, &robot);
+  return robot;
 }
 
 }  // namespace
@@ -109,7 +131,10 @@ RecordFolder::RecordFolder(const std::string& log, const About& about)
   make(folder_ / kTypes);
   for (const MessageDefinition& definition : MessageDefinitions())
     WriteAtomically(folder_ / kTypes / definition.file, definition.text);
+  fs::remove_all(folder_ / kMeshes, error);
   if (!robot) return;
+  if (!robot->meshes.empty()) make(folder_ / kMeshes);
+  for (const auto& [name, bytes] : robot->meshes) WriteAtomically(folder_ / name, bytes);
   WriteAtomically(folder_ / kUrdf, robot->urdf);
   WriteAtomically(folder_ / kToml, robot->toml);
 }

@@ -15,6 +15,7 @@ namespace plumb {
 ///
 ///   record.json                  what was recorded, when, by which version and command
 ///   robot.toml, robot.urdf       the robot, with all that its file extends: a robot's folder
+///   meshes/                      its collision meshes, which robot.urdf names
 ///   parameter_distribution.json  the newest PARAMETER_DISTRIBUTION in the log
 ///   lcmtypes/                    what the messages mean, for lcm-gen
 ///

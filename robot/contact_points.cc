@@ -18,6 +18,12 @@ std::vector<std::pair<Eigen::Vector3d, double>> ContactSpheres(const Shape& shap
       }
       return corners;
     }
+    case Shape::Type::kMesh: {
+      std::vector<std::pair<Eigen::Vector3d, double>> corners;
+      for (const Eigen::Vector3d& corner : shape.corners)
+        corners.emplace_back(shape.position + shape.rotation * corner, 0);
+      return corners;
+    }
     case Shape::Type::kCylinder:
       break;
   }

@@ -9,8 +9,8 @@
 namespace plumb {
 
 /// Where a shape can touch the ground: centres [m] of spheres in the link frame and their radii. A
-/// sphere and the ends of a capsule are spheres, the corners of a box have radius zero; a
-/// cylinder's rim is not one of them. Thread-safe.
+/// sphere and the ends of a capsule are spheres, the corners of a box and of a mesh's hull have
+/// radius zero; a cylinder's rim is not one of them. Thread-safe.
 std::vector<std::pair<Eigen::Vector3d, double>> ContactSpheres(const Shape& shape);
 
 /// A sphere on a link that can touch the ground.

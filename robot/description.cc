@@ -8,6 +8,7 @@
 #include "common/config.h"
 #include "common/hash.h"
 #include "common/nearest_name.h"
+#include "robot/contact_pairs.h"
 #include "robot/urdf/urdf.h"
 
 namespace plumb {
@@ -150,12 +151,9 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
   header.Finish();
   UrdfModel urdf = ReadUrdf(header, urdf_path, fixed);
   files.push_back(urdf_path);
-  robot.fingerprint = kEmptyHash;
-  for (const std::string& part : files) robot.fingerprint = Hash(ReadFile(part), robot.fingerprint);
   if (urdf.joints.empty()) root.Fail("robot", "has no moving joint in " + urdf_file);
   robot.buses = ReadBuses(root);
   robot.joints = ReadJoints(root, urdf, robot.buses);
-  robot.links = std::move(urdf.links);
 
   for (const JointDescription& joint : robot.joints) {
     const MotorDescription& motor = joint.motor;
@@ -165,11 +163,19 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
                             joint.name, motor.protocol));
     }
   }
+  robot.links = urdf.links;
   robot.sensors = ReadSensors(root, robot);
   RequireUse(root, robot);
   robot.driver = ReadDriver(root.Table("driver"), robot.joints);
   robot.task = ReadTask(root.Table("task"), robot.joints);
   robot.simulation = ReadSimulation(root.Table("simulation"), robot.task.period);
+  if (robot.simulation.contact && robot.simulation.meshes) {
+    robot.meshes = urdf.LoadCollisionMeshes();
+    robot.links = std::move(urdf.links);
+    files.insert(files.end(), robot.meshes.begin(), robot.meshes.end());
+  }
+  robot.fingerprint = kEmptyHash;
+  for (const std::string& part : files) robot.fingerprint = Hash(ReadFile(part), robot.fingerprint);
   robot.estimator = ReadEstimator(root.Table("estimator"), robot);
   robot.warnings = std::move(urdf.warnings);
   // Whoever meant his own must see that it is another one.
@@ -179,7 +185,12 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
   if (robot.simulation.contact) {
     robot.warnings.insert(robot.warnings.end(), urdf.contact_warnings.begin(),
                           urdf.contact_warnings.end());
+    if (!robot.simulation.link_pairs.empty()) {
+      robot.warnings.insert(robot.warnings.end(), urdf.pair_warnings.begin(),
+                            urdf.pair_warnings.end());
+    }
   }
+  FindContactPairs(robot);  // or it says what is wrong with one
   ReadParameters(root, robot.parameters, robot.frozen);
   robot.controller = ReadController(root.Table("controller"));
   robot.calibration = ReadCalibration(root.Table("calibration"));

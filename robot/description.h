@@ -29,6 +29,7 @@ struct RobotDescription {
   std::string file;  ///< the TOML file
   /// of the contents of all files (FNV-1a): a checkpoint of other contents is another's
   uint64_t fingerprint = 0;
+  std::vector<std::string> meshes;  ///< files of collision meshes
   std::string name;
   std::vector<LinkDescription> links;
   std::vector<JointDescription> joints;
@@ -39,7 +40,7 @@ struct RobotDescription {
   SimulationSettings simulation;
   std::vector<ParameterDescription> parameters;  ///< the uncertain ones
   std::vector<FrozenParameter> frozen;           ///< the others
-  std::vector<std::string> warnings;             ///< of parts without effect, e.g. a collision mesh
+  std::vector<std::string> warnings;  ///< of parts without effect, e.g. a collision cylinder
   TaskSettings task;
   ControllerSettings controller;
   CalibrationSettings calibration;

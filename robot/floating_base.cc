@@ -95,10 +95,11 @@ FloatingBase FloatingBaseOf(const RobotDescription& robot) {
   if (points.empty())
     Refuse(
         "nothing of it can touch the ground: no [simulation.contact], or no <collision> of "
-        "spheres, capsules or boxes");
+        "spheres, capsules, boxes or meshes");
   if (points.size() > FloatingBase::kMaxPoints) {
-    Refuse(fmt::format("{} points can touch the ground, more than {}", points.size(),
-                       FloatingBase::kMaxPoints));
+    Refuse(fmt::format(
+        "{} points can touch the ground, more than {}{}", points.size(), FloatingBase::kMaxPoints,
+        robot.meshes.empty() ? "" : ": leave out meshes with simulation.contact.meshes"));
   }
   if (!std::all_of(points.begin(), points.end(), moved))
     Refuse("what touches the ground does not hang on the IMU's link");

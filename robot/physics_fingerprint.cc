@@ -36,6 +36,7 @@ void AddLink(const LinkDescription& link, Fingerprint* hash) {
   for (const Shape& shape : link.collisions) {
     hash->Add(static_cast<double>(shape.type));
     hash->Add(shape.position), hash->Add(shape.rotation), hash->Add(shape.size);
+    for (const Eigen::Vector3d& corner : shape.corners) hash->Add(corner);
   }
 }
 
@@ -68,6 +69,8 @@ void AddSimulation(const SimulationSettings& s, Fingerprint* hash) {
       hash->Add(number);
     }
   }
+  for (const SimulationSettings::LinkPair& pair : s.link_pairs)
+    hash->Add(pair.first), hash->Add(pair.second);
   hash->Add(s.stop ? "stop" : "");
   if (s.stop) hash->Add(s.stop->stiffness), hash->Add(s.stop->damping);
 }

@@ -7,28 +7,28 @@
 namespace plumb {
 namespace {
 
-using json = nlohmann::ordered_json;
+using Json = nlohmann::ordered_json;
 
 // More would be no residual but an attack on the memory.
 // Displacement and velocity in space.
 constexpr size_t kMostOfContact = 6;
 
-json Singles(const Eigen::VectorXd& x) {
-  json list = json::array();
+Json Singles(const Eigen::VectorXd& x) {
+  Json list = Json::array();
   for (const double number : x) list.push_back(ShortestSingle(number));
   return list;
 }
 
-json Singles(const Eigen::MatrixXd& matrix) {
-  json rows = json::array();
+Json Singles(const Eigen::MatrixXd& matrix) {
+  Json rows = Json::array();
   for (Eigen::Index i = 0; i < matrix.rows(); ++i)
     rows.push_back(Singles(Eigen::VectorXd(matrix.row(i))));
   return rows;
 }
 
-json ToJson(const std::optional<ResidualFunction>& function) {
+Json ToJson(const std::optional<ResidualFunction>& function) {
   if (!function) return nullptr;
-  json weights = json::array();
+  Json weights = Json::array();
   for (const Eigen::MatrixXd& draw : function->weights) weights.push_back(Singles(draw));
   return {{"mean", Singles(function->mean)},       {"scale", Singles(function->scale)},
           {"low", Singles(function->low)},         {"high", Singles(function->high)},
@@ -98,11 +98,11 @@ double ShortestSingle(double number) {
   return shortest;
 }
 
-json ResidualJson(const Residual& residual) {
-  json draws = json::array();
+Json ResidualJson(const Residual& residual) {
+  Json draws = Json::array();
   for (const Eigen::VectorXd& draw : residual.coordinates)
     draws.push_back(std::vector<double>(draw.begin(), draw.end()));
-  json object{{"draws", draws}, {"margin", ShortestSingle(residual.margin)}};
+  Json object{{"draws", draws}, {"margin", ShortestSingle(residual.margin)}};
   for (const Residual::Part& part : Residual::kParts)
     object[part.name] = ToJson(residual.*part.function);
   return object;

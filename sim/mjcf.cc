@@ -6,9 +6,12 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <vector>
 
 #include "common/decompositions.h"
+#include "robot/contact_pairs.h"
+#include "robot/contact_points.h"
 
 namespace plumb {
 namespace {
@@ -47,7 +50,8 @@ struct Placed {
 
 class Writer {
  public:
-  explicit Writer(const RobotDescription& robot) : robot_(robot) {}
+  explicit Writer(const RobotDescription& robot)
+      : robot_(robot), touching_(FindContactPairs(robot)) {}
 
   std::string Write() {
     text_ = fmt::format(
@@ -55,17 +59,28 @@ class Writer {
         "<option timestep=\"0.002\" integrator=\"RK4\" gravity=\"{}\"/>\n<worldbody>\n",
         Name(robot_.name), Words(robot_.simulation.gravity * robot_.virtual_robot.ground.Down()));
     if (const auto& contact = robot_.simulation.contact) {
-      surface_ = fmt::format(
-          "condim=\"3\" friction=\"{} 0.005 0.0001\" margin=\"0.001\" solref=\"{} 1\" "
-          "solimp=\"0.8 0.8 0.01\"",
-          contact->friction, ContactTime(robot_));
+      softness_ =
+          fmt::format("condim=\"3\" margin=\"0.001\" solref=\"{} 1\" solimp=\"0.8 0.8 0.01\"",
+                      ContactTime(robot_));
+      surface_ = fmt::format("friction=\"{} 0.005 0.0001\" {}", contact->friction, softness_);
       text_ += "<geom type=\"plane\" size=\"0 0 1\" contype=\"0\" conaffinity=\"1\" " + surface_ +
                "/>\n";
+    }
+    for (const ContactPairs::Solid& at : touching_.solids) {
+      if (at.link == 0) {
+        WriteShape(0, at.shape);
+      } else if (Weightless(static_cast<size_t>(at.link) - 1)) {
+        throw std::invalid_argument("contact of link '" +
+                                    robot_.links[static_cast<size_t>(at.link)].name +
+                                    "', which has no mass, with other links");
+      }
     }
     WriteChildren(0);
     text_ += "</worldbody>\n<actuator>\n";
     for (const int i : robot_.driven()) WriteMotor(joint(static_cast<size_t>(i)));
-    return text_ + "</actuator>\n</mujoco>\n";
+    text_ += "</actuator>\n";
+    if (!touching_.pairs.empty()) WritePairs();
+    return text_ + "</mujoco>\n";
   }
 
  private:
@@ -99,7 +114,7 @@ class Writer {
         Words(link.center_of_mass), link.mass, inertia(0, 0), inertia(1, 1), inertia(2, 2),
         inertia(0, 1), inertia(0, 2), inertia(1, 2));
     if (robot_.simulation.contact) {
-      for (const Shape& shape : link.collisions) WriteShape(shape);
+      for (size_t i = 0; i < link.collisions.size(); ++i) WriteShape(last + 1, i);
     }
     WriteChildren(static_cast<int>(last) + 1);
     text_ += "</body>\n";
@@ -148,7 +163,13 @@ class Writer {
         Name(j.name), j.dynamics.motor_gain, -j.effort_limit, j.effort_limit);
   }
 
-  void WriteShape(const Shape& shape) {
+  /// Of a shape of a link: for the pairs.
+  std::string ShapeName(size_t link, size_t shape) const {
+    return fmt::format("{}/{}", Name(robot_.links[link].name), shape);
+  }
+
+  void WriteShape(size_t link, size_t index) {
+    const Shape& shape = robot_.links[link].collisions[index];
     std::string type, size;
     switch (shape.type) {
       case Shape::Type::kSphere:
@@ -160,17 +181,41 @@ class Writer {
       case Shape::Type::kBox:
         type = "box", size = Words(shape.size / 2);
         break;
+      case Shape::Type::kMesh:
+        for (const auto& [corner, radius] : ContactSpheres(shape)) {
+          text_ += fmt::format(
+              "<geom type=\"sphere\" size=\"{}\" pos=\"{}\" contype=\"1\" "
+              "conaffinity=\"0\" {}/>\n",
+              kPoint, Words(corner), surface_);
+        }
+        return;
       default:
         return;  // the robot's warnings say so
     }
     text_ += fmt::format(
-        "<geom type=\"{}\" size=\"{}\" pos=\"{}\" quat=\"{}\" contype=\"1\" conaffinity=\"0\" "
-        "{}/>\n",
-        type, size, Words(shape.position), Turn(shape.rotation), surface_);
+        "<geom name=\"{}\" type=\"{}\" size=\"{}\" pos=\"{}\" quat=\"{}\" contype=\"{}\" "
+        "conaffinity=\"0\" {}/>\n",
+        ShapeName(link, index), type, size, Words(shape.position), Turn(shape.rotation),
+        link > 0 ? 1 : 0, surface_);
+  }
+
+  void WritePairs() {
+    text_ += "<contact>\n";
+    for (const auto& [first, second] : touching_.pairs) {
+      const auto name = [this](size_t solid) {
+        const ContactPairs::Solid& at = touching_.solids[solid];
+        return ShapeName(static_cast<size_t>(at.link), at.shape);
+      };
+      text_ += fmt::format(
+          "<pair geom1=\"{0}\" geom2=\"{1}\" friction=\"{3} {3} 0.005 0.0001 0.0001\" {2}/>\n",
+          name(first), name(second), softness_, robot_.simulation.contact->friction);
+    }
+    text_ += "</contact>\n";
   }
 
   const RobotDescription& robot_;
-  std::string surface_, text_;
+  const ContactPairs touching_;
+  std::string softness_, surface_, text_;
 };
 
 }  // namespace

@@ -4,6 +4,8 @@
 #include <stdexcept>
 
 #include "common/decompositions.h"
+#include "robot/contact_pairs.h"
+#include "robot/contact_points.h"
 
 namespace plumb {
 namespace {
@@ -104,19 +106,36 @@ RobotDescription Model::Describe(const Eigen::Ref<const Eigen::VectorXd>& physic
   }
   SimulationSettings& settings = robot.simulation;
   settings.set_world(physics.world);
-  if (settings.contact) {
-    for (size_t i = 1; i < robot.links.size(); ++i) {
-      std::vector<Shape> spheres;
-      while (point < topology_.points.size() &&
-             topology_.points[point].link == static_cast<int>(i)) {
+  // Balls where points touch the ground; but meshes, and what touches other links, stay what they
+  // are.
+  const ContactPairs touching = FindContactPairs(description_);
+  std::vector<bool> touches(robot.links.size());
+  for (const ContactPairs::Solid& at : touching.solids)
+    touches[static_cast<size_t>(at.link)] = true;
+  for (size_t i = 1; settings.contact && i < robot.links.size(); ++i) {
+    std::vector<Shape> shapes;
+    for (Shape shape : robot.links[i].collisions) {
+      const size_t count = ContactSpheres(shape).size();
+      for (size_t k = 0; k < count; ++k) {
         const Physics<double>::Point& now = physics.points[point++];
-        Shape sphere;
-        sphere.position = topology_.link_axes[i].transpose() * vector(now.position);
-        sphere.size = Vector3d(now.radius, 0, 0);
-        spheres.push_back(sphere);
+        const Vector3d centre = topology_.link_axes[i].transpose() * vector(now.position);
+        if (shape.type == Shape::Type::kMesh) {
+          shape.corners[k] = shape.rotation.transpose() * (centre - shape.position);
+        } else if (!touches[i]) {
+          shapes.push_back({.position = centre, .size = Vector3d(now.radius, 0, 0)});
+        }
       }
-      robot.links[i].collisions = std::move(spheres);
+      if (touches[i] || shape.type == Shape::Type::kMesh) shapes.push_back(std::move(shape));
     }
+    robot.links[i].collisions = std::move(shapes);
+  }
+  for (size_t i = 0; i < touching.solids.size(); ++i) {
+    const auto link = static_cast<size_t>(touching.solids[i].link);
+    const Physics<double>::Solid& now = physics.solids[i];
+    Shape& shape = robot.links[link].collisions[touching.solids[i].shape];
+    shape.position = topology_.link_axes[link].transpose() * vector(now.position);
+    if (shape.type == Shape::Type::kBox) shape.size = 2 * vector(now.half);
+    if (shape.type == Shape::Type::kCapsule) shape.size.y() = 2 * now.half[2];
   }
   return robot;
 }

@@ -6,6 +6,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "robot/contact_pairs.h"
 #include "robot/contact_points.h"
 
 namespace plumb {
@@ -86,6 +87,17 @@ Parameters::Parameters(const RobotDescription& description, const Topology& topo
       base_.points.push_back(point);
       point_links_.push_back(at.link);
     }
+  }
+  for (const ContactPairs::Solid& at : FindContactPairs(description).solids) {
+    const auto link = static_cast<size_t>(at.link);
+    const Shape& shape = description.links[link].collisions[at.shape];
+    const RoundedBox box(shape);
+    Physics<double>::Solid solid{};
+    Vector3d::Map(solid.position) = topology.link_axes[link] * shape.position;
+    Vector3d::Map(solid.half) = box.half;
+    solid.radius = box.radius;
+    base_.solids.push_back(solid);
+    solid_links_.push_back(at.link);
   }
 
   FindPathsOf(description);
@@ -235,6 +247,11 @@ void Parameters::Scale(const ParameterPath& path, double value, Physics<double>*
       }
       for (size_t i = 0; i < point_links_.size(); ++i) {
         if (point_links_[i] == link) scale(physics->points[i].position, 3, factor);
+      }
+      for (size_t i = 0; i < solid_links_.size(); ++i) {
+        if (solid_links_[i] != link) continue;
+        scale(physics->solids[i].position, 3, factor);
+        scale(physics->solids[i].half, 3, factor);
       }
       break;
     }

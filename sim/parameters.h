@@ -98,6 +98,7 @@ class Parameters {
 
   std::vector<int> parents_;                // link that carries each joint
   std::vector<int> point_links_;            // link of each contact point
+  std::vector<int> solid_links_;            // and of each shape that touches others
   std::vector<Eigen::Matrix3d> link_axes_;  // of the link of each joint, in working axes
   std::vector<Eigen::Vector3d> centers_;    // of mass, in the link frame
   std::vector<Eigen::Matrix3d> roots_;      // L of each link, in working axes

@@ -76,7 +76,7 @@ ProjectedErrors::ProjectedErrors(const RobotDescription& robot, const FitResidua
     index.emplace(std::pair(row.rollout, row.transition), 0);
   if (!residuals.where.empty() && residuals.where.size() != index.size())
     throw std::invalid_argument("it is not known of each transition where it was");
-  int ground = 0, stop = 0;
+  int ground = 0, stop = 0, links = 0;
   for (auto& [key, number] : index) {
     number = static_cast<int>(steps.size());
     const auto& transitions = residuals.rollouts[static_cast<size_t>(key.first)].transitions;
@@ -90,10 +90,11 @@ ProjectedErrors::ProjectedErrors(const RobotDescription& robot, const FitResidua
       q = where.q, v = where.v;
       touch = FindTouch(robot, where.q);
       const Touch end = where.next_q.allFinite() ? FindTouch(robot, where.next_q) : touch;
-      touch = {touch.ground || end.ground, touch.stop || end.stop};
+      touch = touch | end;
     }
     ground += touch.ground;
     stop += touch.stop;
+    links += touch.links;
     steps.push_back({&transition, std::move(q), std::move(v), touch.any(), -1, false,
                      std::vector<Eigen::Index>(static_cast<size_t>(2 * n), -1)});
     const auto before = index.find({key.first, key.second - 1});
@@ -105,11 +106,11 @@ ProjectedErrors::ProjectedErrors(const RobotDescription& robot, const FitResidua
   }
   const auto touching =
       std::count_if(steps.begin(), steps.end(), [](const Step& step) { return step.contact; });
-  contact_words = static_cast<double>(ground) >= kMostOf * static_cast<double>(touching)
-                      ? "at ground contact"
-                  : static_cast<double>(stop) >= kMostOf * static_cast<double>(touching)
-                      ? "at a stop"
-                      : "in contact with the ground or a stop";
+  contact_words =
+      static_cast<double>(ground) >= kMostOf * static_cast<double>(touching) ? "at ground contact"
+      : static_cast<double>(stop) >= kMostOf * static_cast<double>(touching) ? "at a stop"
+      : links > 0 ? "in contact with the ground, a stop or another link"
+                  : "in contact with the ground or a stop";
   conditions = touching >= kFewest && static_cast<int>(steps.size()) - touching >= kFewest;
   for (size_t i = 0; i < residuals.rows.size(); ++i) {
     const WindowErrors::Row& row = residuals.rows[i];

@@ -3,6 +3,7 @@
 #include "calibrator/fit/recorded_window.h"
 #include "sim/residual_inputs.h"
 #include "sim/simulator.h"
+#include "sim/touch.h"
 
 namespace plumb {
 namespace {
@@ -40,13 +41,18 @@ SortedErrors CollectErrors(const std::shared_ptr<const Model>& model,
   ResidualInputs inputs(*model, margin);
   Simulator simulator(model);
   simulator.SetParameters(physical);
+  // What links do to each other is no contact that a function or a disturbance is made for.
+  TouchFinder touch(model->Describe(physical), margin);
+  const auto links_touch = [&](const Transition& t) {
+    return touch.Find(t.q).links || touch.Find(t.next_q).links;
+  };
   for (size_t r = 0; r < rollouts.size(); ++r) {
     const Transition* last = nullptr;
     for (size_t i = 0; i < rollouts[r].transitions.size(); ++i) {
       const Transition& t = rollouts[r].transitions[i];
       const bool follows = last && last->step + 1 == t.step;
       const Eigen::VectorXd effort = MeanEffort(t), before = follows ? MeanEffort(*last) : effort;
-      if (t.next_q.allFinite() && t.next_v.allFinite()) {
+      if (t.next_q.allFinite() && t.next_v.allFinite() && !links_touch(t)) {
         BeginTransition(rollouts[r], i, &simulator);
         inputs.Begin(simulator);
         simulator.Step(t.efforts);

@@ -14,7 +14,7 @@ Touch FindTouch(const RobotDescription& robot, const Transition& transition) {
   const Touch begin = FindTouch(robot, transition.q);
   if (!transition.next_q.allFinite()) return begin;
   const Touch end = FindTouch(robot, transition.next_q);
-  return {begin.ground || end.ground, begin.stop || end.stop};
+  return begin | end;
 }
 
 }  // namespace plumb

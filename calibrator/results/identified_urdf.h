@@ -16,8 +16,8 @@ namespace plumb {
 ///
 /// Links and joints that LoadRobot reads from it are those of Model::Describe(mean). Where fixed
 /// joints weld several bodies with mass into one link that changes, the first of them carries all
-/// of the mass. A link whose length changes takes its solids with it; its meshes stay as they are,
-/// and so do paths to meshes: the file belongs beside the original.
+/// of the mass. A link whose length changes takes its solids and meshes with it. Paths to meshes
+/// stay as they are: the file belongs beside the original.
 ///
 /// @param robot as LoadRobot read it; its files are read again.
 /// @param mean,sd of its parameters, physical units. Frozen parameters have the values that they

@@ -164,6 +164,10 @@ void UrdfNumbers::StretchSolid(const TiXmlElement& solid, double factor) {
   };
   if (type == "box") scale("size", 3);
   if (type == "cylinder" || type == "capsule") scale("length", 1);
+  if (type == "mesh") {
+    const Vector3d old = solid.Attribute("scale") ? Vector(&solid, "scale") : Vector3d::Ones();
+    Set(solid, "scale", {factor * old.x(), factor * old.y(), factor * old.z()}, 0);
+  }
 }
 
 // The link's mass, into the first body that has any.

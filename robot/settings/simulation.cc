@@ -1,5 +1,7 @@
 #include "robot/settings/simulation.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <limits>
 
@@ -8,11 +10,13 @@
 namespace plumb {
 namespace {
 
+constexpr size_t kMostPairs = 1000;
+
 // Gravity may be left out; of a table that is there, nothing may.
-World ReadWorld(Config& simulation, const SimulationSettings& settings) {
+World ReadWorld(Config& simulation, Config& contact, Config& limit,
+                const SimulationSettings& settings) {
   using Table = WorldParameterKind::Table;
   World world;
-  Config contact = simulation.Table("contact", false), limit = simulation.Table("limit", false);
   for (const WorldParameterKind& kind : kWorldParameterKinds) {
     if (!settings.Has(kind.table)) continue;
     Config& table = kind.table == Table::kContact ? contact
@@ -22,9 +26,20 @@ World ReadWorld(Config& simulation, const SimulationSettings& settings) {
     kind.of(world) = optional ? table.Number(kind.key, kind.in_file, kind.of(world))
                               : table.Number(kind.key, kind.in_file);
   }
-  contact.Finish();
-  limit.Finish();
   return world;
+}
+
+std::vector<SimulationSettings::LinkPair> ReadLinkPairs(Config& contact) {
+  std::vector<SimulationSettings::LinkPair> pairs;
+  for (Config& pair : contact.Tables("pair")) {
+    const std::vector<std::string> links = pair.Strings("links");
+    if (links.size() != 2) pair.Fail("links", "must name two links that touch each other");
+    pairs.push_back({links[0], links[1], pair.Position("links")});
+    pair.Finish();
+    if (pairs.size() > kMostPairs)
+      pair.Fail("links", fmt::format("is one of more than {}", kMostPairs));
+  }
+  return pairs;
 }
 
 }  // namespace
@@ -60,7 +75,12 @@ SimulationSettings ReadSimulation(Config config, double period) {
   if (s.latency >= period) config.Fail("latency", "must be shorter than task.period");
   if (config.Has("contact")) s.contact.emplace();
   if (config.Has("limit")) s.stop.emplace();
-  s.set_world(ReadWorld(config, s));
+  Config contact = config.Table("contact", false), limit = config.Table("limit", false);
+  s.set_world(ReadWorld(config, contact, limit, s));
+  s.link_pairs = ReadLinkPairs(contact);
+  s.meshes = contact.Boolean("meshes", true);
+  contact.Finish();
+  limit.Finish();
   config.Finish();
   return s;
 }

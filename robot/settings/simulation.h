@@ -1,6 +1,8 @@
 #pragma once
 
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "common/config.h"
 #include "robot/parameter_kinds.h"
@@ -25,6 +27,16 @@ struct SimulationSettings {
   using Stop = StopOf<double>;
   std::optional<Contact> contact;  ///< none: the robot does not touch the ground
   std::optional<Stop> stop;        ///< none: joints move on beyond their limits
+
+  bool meshes = true;  ///< collision meshes touch the ground, too
+
+  /// Links that touch each other, by names that may have the wildcards of fnmatch(3), of which none
+  /// stands for a slash.
+  struct LinkPair {
+    std::string first, second;
+    std::string place = {};  ///< of it in the file, for messages
+  };
+  std::vector<LinkPair> link_pairs = {};  ///< see ContactPairs
 
   /// The numbers among these that may be uncertain parameters.
   World world() const { return {gravity, contact.value_or(Contact{}), stop.value_or(Stop{})}; }

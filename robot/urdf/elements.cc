@@ -115,7 +115,7 @@ class ElementReader {
   }
 
   std::vector<UrdfElements::Solid> ReadSolids(const TiXmlElement& link, const char* kind,
-                                              std::vector<int>* meshes) {
+                                              std::vector<UrdfElements::Mesh>* meshes) {
     std::vector<UrdfElements::Solid> solids;
     for (const TiXmlElement* e = link.FirstChildElement(kind); e; e = e->NextSiblingElement(kind)) {
       CheckChildren(*e, {"origin", "geometry"}, {"material", "verbose", "contact"});
@@ -128,10 +128,16 @@ class ElementReader {
       if (solid->ValueStr() != "mesh") {
         solids.push_back({solid->Row(), ReadSolid(*solid, origin)});
       } else if (meshes) {
-        meshes->push_back(e->Row());
+        meshes->push_back(ReadMesh(*solid, origin));
       }
     }
     return solids;
+  }
+
+  UrdfElements::Mesh ReadMesh(const TiXmlElement& mesh, const Pose& origin) {
+    UrdfElements::Mesh read{mesh.Row(), origin, xml_.Name(mesh, "filename")};
+    if (mesh.Attribute("scale")) read.scale = ToVector(xml_.Numbers(mesh, "scale", 3, kSane));
+    return read;
   }
 
   Shape ReadSolid(const TiXmlElement& solid, const Pose& origin) {

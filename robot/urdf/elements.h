@@ -29,12 +29,18 @@ struct UrdfElements {
     int line = 0;
     Shape shape;
   };
+  struct Mesh {
+    int line = 0;
+    Pose origin;
+    std::string file;  ///< as it is named
+    Eigen::Vector3d scale = Eigen::Vector3d::Ones();
+  };
   struct Link {
     int line = 0;
     std::optional<Inertial> inertial = {};
     std::vector<Solid> visuals = {}, collisions = {};  ///< without meshes
-    std::vector<int> collision_meshes = {};            ///< lines
-    std::vector<std::string> joints = {};              ///< that it carries, in the file's order
+    std::vector<Mesh> collision_meshes = {};
+    std::vector<std::string> joints = {};  ///< that it carries, in the file's order
   };
   struct Joint {
     int line = 0;

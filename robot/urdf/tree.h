@@ -8,13 +8,15 @@ namespace plumb {
 
 /// A solid of URDF's <visual> or <collision>. Plain data, as all of this file: not thread-safe.
 struct Shape {
-  enum class Type { kSphere, kCapsule, kCylinder, kBox };
+  enum class Type { kSphere, kCapsule, kCylinder, kBox, kMesh };
   Type type = Type::kSphere;
   Eigen::Vector3d position = Eigen::Vector3d::Zero();      ///< [m] of its centre, in the link frame
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< its axes in the link's
   /// [m] sphere: (radius, 0, 0); box: edges along x, y, z; capsule and cylinder, which stand along
   /// z: (radius, length, 0), a capsule's length without its caps.
   Eigen::Vector3d size = Eigen::Vector3d::Zero();
+  /// [m] of a mesh: of its convex hull, in its own axes, from its position
+  std::vector<Eigen::Vector3d> corners = {};
 };
 
 /// A rigid body. Frames as in URDF: the link frame is at the joint that moves it. What hangs on it

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
+#include <map>
 #include <stdexcept>
 #include <utility>
 
@@ -11,11 +12,14 @@
 #include "common/nearest_name.h"
 #include "common/special_numbers.h"
 #include "robot/urdf/elements.h"
+#include "robot/urdf/mesh.h"
 
 namespace plumb {
 namespace {
 
-constexpr size_t kMaxJoints = 500;  // as many as are still a robot
+constexpr size_t kMaxJoints = 500;      // as many as are still a robot
+constexpr size_t kMaxMeshes = 100;      // and as many files
+constexpr double kWorthSaying = 0.001;  // [m] that a hull has lost
 
 using Pose = UrdfElements::Pose;
 
@@ -164,19 +168,26 @@ class ModelReader {
       shape.rotation = pose.axes * shape.rotation;
       to->push_back(shape);
     };
-    const auto warn = [&](int line, const char* what) {
-      if (index == 0) return;  // does not move
-      model_.contact_warnings.push_back(
-          fmt::format("{}:{}: link {}: a collision {} does not touch the ground: only spheres, "
-                      "capsules and boxes do",
-                      model_.file, line, name, what));
+    const auto warn = [&](int line, const std::string& what) {
+      const bool moves = index > 0;
+      (moves ? model_.contact_warnings : model_.pair_warnings)
+          .push_back(fmt::format("{}:{}: link {}: a collision {} touches nothing: only spheres, "
+                                 "capsules and boxes do{}",
+                                 model_.file, line, name, what, moves ? ", and meshes" : ""));
     };
     for (const UrdfElements::Solid& visual : link.visuals) add(visual.shape, &ours.visuals);
     for (const UrdfElements::Solid& collision : link.collisions) {
       add(collision.shape, &ours.collisions);
       if (collision.shape.type == Shape::Type::kCylinder) warn(collision.line, "cylinder");
     }
-    for (const int line : link.collision_meshes) warn(line, "mesh");
+    for (UrdfElements::Mesh mesh : link.collision_meshes) {
+      if (index == 0) {
+        warn(mesh.line, "mesh");
+        continue;
+      }
+      mesh.origin = pose * mesh.origin;
+      model_.collision_meshes.push_back({index, name, std::move(mesh)});
+    }
   }
 
   // Adds the inertia of a URDF link to our link `index` (parallel axis theorem).
@@ -220,6 +231,44 @@ class ModelReader {
 
 void UrdfModel::Fail(int line, const std::string& what) const {
   throw ConfigError(fmt::format("{}:{}: {}", file, line, what));
+}
+
+std::vector<std::string> UrdfModel::LoadCollisionMeshes() {
+  std::map<std::string, std::vector<Eigen::Vector3d>> points_of;  // of each file, read once
+  for (const Mesh& one : collision_meshes) {
+    const UrdfElements::Mesh& mesh = one.mesh;
+    const std::string place = fmt::format("{}:{}: ", file, mesh.line),
+                      what = fmt::format("link {}: collision mesh {}", one.link_name, mesh.file);
+    if (!IsMeshFormat(mesh.file)) {
+      contact_warnings.push_back(place + what +
+                                 " does not touch the ground: it is neither STL nor OBJ");
+      continue;
+    }
+    const std::string path = FindMesh(mesh.file, file);
+    if (path.empty()) Fail(mesh.line, what + ": there is no such file");
+    const auto [points, is_new] = points_of.try_emplace(path);
+    if (points_of.size() > kMaxMeshes)
+      Fail(mesh.line, fmt::format("{} is one of more than {}", what, kMaxMeshes));
+    try {
+      if (is_new) points->second = MeshPoints(ReadFile(path));
+    } catch (const std::runtime_error& error) {
+      Fail(mesh.line, what + ": " + error.what());
+    }
+    HullCorners hull = FindHullCorners(points->second, mesh.scale);
+    if (hull.lost > kWorthSaying) {
+      contact_warnings.push_back(
+          place + what +
+          fmt::format(" touches the ground with {} corners of its hull: it reaches up to {:.1f} mm "
+                      "farther",
+                      hull.corners.size(), 1000 * hull.lost));
+    }
+    Shape shape{Shape::Type::kMesh, mesh.origin.at, mesh.origin.axes};
+    shape.corners = std::move(hull.corners);
+    links[static_cast<size_t>(one.link)].collisions.push_back(std::move(shape));
+  }
+  std::vector<std::string> files;
+  for (const auto& [path, points] : points_of) files.push_back(path);
+  return files;
 }
 
 UrdfModel LoadUrdf(const std::string& file, const std::vector<std::string>& fixed) {

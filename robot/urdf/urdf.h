@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "robot/urdf/elements.h"
 #include "robot/urdf/tree.h"
 
 namespace plumb {
@@ -31,6 +32,21 @@ struct UrdfModel {
   std::vector<int> link_lines;                ///< in the file
   std::vector<std::string> warnings;          ///< elements without effect
   std::vector<std::string> contact_warnings;  ///< collision solids that do not touch the ground
+  std::vector<std::string> pair_warnings;     ///< and those of the root that no link touches
+
+  /// A mesh of <collision>, not read yet.
+  struct Mesh {
+    int link;               ///< index into links
+    std::string link_name;  ///< in the file
+    UrdfElements::Mesh mesh;
+  };
+  std::vector<Mesh> collision_meshes;
+
+  /// Adds the hulls of the collision meshes to their links, and warnings of those whose format is
+  /// not known or whose hull has too many corners. Once. Thread-safe but for the files and the
+  /// environment, see FindMesh. @return the files that it read, each once.
+  /// @throws ConfigError with the line of one that is not there, cannot be read or is one too many.
+  std::vector<std::string> LoadCollisionMeshes();
 
   /// @throws ConfigError "file:line: what"
   [[noreturn]] void Fail(int line, const std::string& what) const;

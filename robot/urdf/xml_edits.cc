@@ -110,4 +110,19 @@ std::string XmlEdits::Print() const {
   return result + text_.substr(at);
 }
 
+void ForEachCollisionMesh(const TiXmlElement& robot,
+                          const std::function<void(const TiXmlElement&)>& visit) {
+  const auto next = [](const TiXmlElement* element) {
+    return element->NextSiblingElement(element->Value());
+  };
+  for (const TiXmlElement* link = robot.FirstChildElement("link"); link; link = next(link)) {
+    const TiXmlElement* solid = link->FirstChildElement("collision");
+    for (; solid; solid = next(solid)) {
+      const TiXmlElement* geometry = solid->FirstChildElement("geometry");
+      const TiXmlElement* mesh = geometry ? geometry->FirstChildElement("mesh") : nullptr;
+      if (mesh) visit(*mesh);
+    }
+  }
+}
+
 }  // namespace plumb

@@ -2,6 +2,7 @@
 
 #include <tinyxml.h>
 
+#include <functional>
 #include <map>
 #include <string>
 
@@ -40,5 +41,9 @@ class XmlEdits {
   TiXmlDocument document_;
   std::map<size_t, Edit> edits_;  // by offset
 };
+
+/// Visits <mesh> of all <collision> of a URDF's links, in the file's order. Thread-safe.
+void ForEachCollisionMesh(const TiXmlElement& robot,
+                          const std::function<void(const TiXmlElement&)>& visit);
 
 }  // namespace plumb

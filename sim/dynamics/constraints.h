@@ -5,26 +5,33 @@
 #include <limits>
 #include <vector>
 
+#include "sim/dynamics/contact.h"
+#include "sim/dynamics/link_contacts.h"
 #include "sim/dynamics/physics.h"
 #include "sim/dynamics/sparse_cholesky.h"
 #include "sim/dynamics/topology.h"
 
 namespace plumb {
 
-/// Forces that act only sometimes, or not in proportion: joint stops, Coulomb friction,
-/// contact with the ground. All of it is taken at the end of a substep of h seconds, linear in the
-/// velocity v + dv there: force = f - b (v + dv) adds h b to the matrix and h (f - b v) to the
-/// right-hand side of  matrix dv = rhs.
+/// Forces that act only sometimes, or not in proportion: joint stops, Coulomb friction, contact
+/// with the ground and of links with each other. All of it is taken at the end of a substep of h
+/// seconds, linear in the velocity v + dv there: force = f - b (v + dv) adds h b to the matrix and
+/// h (f - b v) to the right-hand side of  matrix dv = rhs.
 ///
 /// Whether something pushes, and by which speed friction is to be divided (Coulomb's force is mu
 /// f_n v / |v|, viscous below a small speed), is found by trial: Find with the free motion; then
-/// Foresee, Assemble, solve and Judge until that has settled. Work space of one Stepper; not
-/// thread-safe. The topology must outlive it.
+/// Foresee, Assemble, solve and Judge until that has settled. In space, where many feet and joints
+/// rub at once and none knows what the others leave it, what is foreseen to slide has its full
+/// force, whatever speed is left; else some that would stick slid with too little of it. Work space
+/// of one Stepper; not thread-safe. The topology must outlive it.
 template <class Real, template <class> class Tree>
 class Constraints {
  public:
   /// [rad/s] or [m/s] below which joint friction is viscous
   static constexpr double kStickSpeed = 0.01;
+
+  static constexpr int kFewestTrials = 2,
+                       kMaxTrials = Tree<Real>::kTangents == 2 ? 8 : 4;  ///< then it goes on as is
 
   /// @param rubs, stops whether any joint may have friction, or stops.
   Constraints(const Topology& topology, bool rubs, bool stops)
@@ -34,9 +41,22 @@ class Constraints {
         n_(static_cast<size_t>(topology.velocities)),
         shift_(n_),
         rubbed_(n_),
+        pushed_(n_),
         outcome_(n_),
-        contacts_(topology.points.size()),
-        rows_(topology.points.size() * kRows * n_) {}
+        links_(topology),
+        contacts_(topology.points.size() + links_.size()),
+        rows_(contacts_.size() * kRows * n_),
+        across_(n_) {
+    size_t p = 0;
+    for (const Topology::Point& point : topology.points)
+      contacts_[p++].chain = {topology.LastVelocity(point.link), topology.ancestors.data()};
+    for (const Topology::Pair& pair : topology.pairs) {
+      const int first = topology.LastVelocity(topology.solids[pair.first].link),
+                second = topology.LastVelocity(topology.solids[pair.second].link);
+      for (size_t k = 0; k < pair.spots; ++k)
+        contacts_[p++].chain = {std::max(first, second), topology.pattern.data()};
+    }
+  }
 
   /// Where the substep stands. Positions are those at which forces are evaluated, `ahead` seconds
   /// before its end.
@@ -53,20 +73,19 @@ class Constraints {
   bool Find(const Substep& now, const Tree<Real>& tree, const Real* trial) {
     bool any = rubs_;
     std::fill(rubbed_.begin(), rubbed_.end(), Real{});
+    std::fill(pushed_.begin(), pushed_.end(), Real{});
     for (const Topology::Joint& joint : topology_.joints) {
       if (any || !HasStop(joint)) continue;
       Real depth, sign;
       StopDepth(joint, now.q, &depth, &sign);
       any = Any(depth - now.ahead * sign * trial[joint.velocity] > 0);
     }
-    for (size_t p = 0; p < contacts_.size(); ++p) {
-      Contact& contact = contacts_[p];
-      contact = Contact{};
-      contact.depth = -tree.Height(now.physics, p);
+    for (size_t p = 0; p < topology_.points.size(); ++p) {
       tree.Jacobian(now.physics, p, &rows_[p * kRows * n_]);
-      contact.active = contact.depth - now.ahead * Along(p, 0, trial) > 0;
-      contact.any = Any(contact.active);
-      any = any || contact.any;
+      any = Begin(now, p, -tree.Height(now.physics, p), trial) || any;
+    }
+    if constexpr (Tree<Real>::kTangents == 2) {
+      if (links_.size() > 0) any = FindLinks(now, tree, trial) || any;
     }
     return any;
   }
@@ -81,23 +100,24 @@ class Constraints {
     bool rubs = rubs_;
     for (size_t i = 0; rubs_ && i < n_; ++i) {
       const Real full = trial[i] < 0 ? Real(-now.friction[i]) : now.friction[i];
-      shift_[i] = now.h * (full - rubbed_[i] * trial[i]);
+      shift_[i] = now.h * (full - pushed_[i] - rubbed_[i] * trial[i]);
     }
     for (size_t p = 0; p < contacts_.size(); ++p) {
       Contact& contact = contacts_[p];
       contact.outcome = Max(contact.speed, now.physics.world.contact.slip_speed);
       if (!contact.any || !Any(contact.pressure > 0)) continue;  // as in the first trial
       rubs = true;
-      const Real more = now.physics.world.contact.friction * contact.pressure - contact.gripped;
+      const Real full = now.physics.world.contact.friction * contact.pressure;
       for (size_t t = 1; t < kRows; ++t) {
-        const Real force = contact.active ? Real(now.h * more * contact.along[t]) : Real{};
+        const Real more = full * contact.along[t] - contact.rubbed[t],
+                   force = contact.active ? Real(now.h * more) : Real{};
         const Real* row = Row(p, t);
-        for (int i = Last(p); i >= 0; i = Ancestor(i))
+        for (int i = contact.chain.last; i >= 0; i = contact.chain.before[i])
           shift_[static_cast<size_t>(i)] += row[i] * force;
       }
     }
     if (!rubs) return;
-    cholesky.Solve(topology_.ancestors, factors, shift_.data());
+    cholesky.Solve(topology_.pattern, factors, shift_.data());
     for (size_t i = 0; rubs_ && i < n_; ++i) {
       const Real taken = trial[i] < 0 ? Real(-shift_[i]) : shift_[i];
       outcome_[i] = Max(Real(Abs(trial[i]) - taken), Real{} + kStickSpeed);
@@ -116,6 +136,13 @@ class Constraints {
     const WorldOf<Real>& world = now.physics.world;
     for (size_t i = 0; rubs_ && i < n_; ++i) {
       rubbed_[i] = now.friction[i] / outcome_[i];
+      if constexpr (kSlides) {
+        const Truth slides = outcome_[i] > kStickSpeed;
+        const Real full = trial[i] < 0 ? Real(-now.friction[i]) : now.friction[i];
+        rubbed_[i] = slides ? Real{} : rubbed_[i];
+        pushed_[i] = slides ? full : Real{};
+        rhs[i] -= now.h * pushed_[i];
+      }
       matrix[i * n_ + i] += now.h * rubbed_[i];
       rhs[i] -= now.h * rubbed_[i] * now.v[i];
     }
@@ -135,12 +162,12 @@ class Constraints {
       if (!contact.any) continue;
       const Real push = contact.active ? world.contact.stiffness * contact.depth : Real{};
       AddForce(now, p, 0, push, contact.active ? Slope(now) : Real{}, matrix, rhs);
-      const Real grip = world.contact.friction * contact.pressure / contact.outcome;
-      contact.gripped = contact.active ? grip : Real{};
-      if (!Any(grip > 0)) continue;
-      for (size_t t = 1; t < kRows; ++t) {
-        AddForce(now, p, t, Real{}, contact.active ? grip : Real{}, matrix, rhs);
-      }
+      const Real full = contact.active ? Real(world.contact.friction * contact.pressure) : Real{};
+      contact.Grip(full, world.contact.slip_speed);
+      if (!Any(full > 0)) continue;
+      for (size_t t = 1; t < kRows; ++t)
+        AddForce(now, p, t, Real(Real{} - contact.pushed[t]), contact.grip, matrix, rhs);
+      if constexpr (kSlides) AddAcross(now, p, matrix, rhs);
     }
   }
 
@@ -150,8 +177,14 @@ class Constraints {
   Mask<Real> Judge(const Substep& now, const Real* trial) {
     constexpr double kSlack = 1.02;
     Truth settled = Real{} < 1;
+    for (size_t i = 0; kSlides && rubs_ && i < n_; ++i) {
+      const Truth beyond = rubbed_[i] * Abs(trial[i]) > kSlack * now.friction[i],
+                  back = pushed_[i] * trial[i] < 0;
+      settled = settled & (beyond == 0) & (back == 0);
+    }
     for (size_t p = 0; p < contacts_.size(); ++p) {
       Contact& contact = contacts_[p];
+      if (!contact.near) continue;
       // One that was far may be pushed into the ground by another, one that pushed may have been
       // pushed out.
       const Real rising = Along(p, 0, trial);
@@ -162,57 +195,82 @@ class Constraints {
       contact.any = contact.any || Any(acts);
       if (!contact.any) continue;
       contact.pressure = Max(force, Real{});
-      Real squared{};
-      for (size_t t = 1; t < kRows; ++t) {
-        contact.along[t] = Along(p, t, trial);
-        squared += contact.along[t] * contact.along[t];
-      }
-      contact.speed = Sqrt(squared);
-      for (size_t t = 1; t < kRows; ++t) {
-        contact.along[t] = contact.speed > 0 ? Real(contact.along[t] / contact.speed) : Real{};
-      }
-      contact.gripped *= contact.speed;
+      Real velocity[kRows];
+      for (size_t t = 1; t < kRows; ++t) velocity[t] = Along(p, t, trial);
+      const Real power = contact.Rub(velocity);
       // Not: is inside. What is not finite will not settle, and must not look unsettled only beside
       // others.
-      const Truth beyond =
-          contact.gripped > kSlack * now.physics.world.contact.friction * contact.pressure;
-      settled = settled & (beyond == 0);
+      const Truth beyond = Contact::Length(contact.rubbed) >
+                           kSlack * now.physics.world.contact.friction * contact.pressure;
+      settled = settled & (beyond == 0) & ((power < 0) == 0);
     }
     return settled;
   }
 
  private:
   static constexpr size_t kRows = 1 + Tree<Real>::kTangents;  // upwards, and along the ground
+  using Contact = plumb::Contact<Real, kRows>;
   using Truth = Mask<Real>;
+  static constexpr bool kSlides = Contact::kSlides;
 
-  struct Contact {
-    Truth active;
-    Real depth;         // where forces are evaluated
-    Real pressure;      // normal force of the latest trial
-    Real speed;         // along the ground, then
-    Real along[kRows];  // and which way: of length one, behind an unused entry
-    Real gripped;       // force of friction in that trial; while it is assembled, per speed
-    Real outcome;       // speed that friction will leave
-    bool any;           // active in some lane
-  };
-
-  int Ancestor(int velocity) const { return topology_.ancestors[static_cast<size_t>(velocity)]; }
   const Real* Row(size_t point, size_t direction) const {
     return &rows_[(point * kRows + direction) * n_];
   }
 
-  // The last velocity that moves the point.
-  int Last(size_t point) const {
-    const int link = topology_.points[point].link;
-    if (link == 0) return -1;
-    const Topology::Joint& joint = topology_.joints[static_cast<size_t>(link - 1)];
-    return joint.velocity + (joint.type == JointDescription::Type::kSpherical ? 2 : 0);
+  // Of a sliding contact.
+  void AddAcross(const Substep& now, size_t p, Real* matrix, Real* rhs) {
+    const Contact& contact = contacts_[p];
+    if (!Any(contact.aside > 0)) return;
+    const Real *one = Row(p, 1), *other = Row(p, kRows - 1);
+    for (int i = contact.chain.last; i >= 0; i = contact.chain.before[i])
+      across_[static_cast<size_t>(i)] =
+          contact.across[1] * one[i] + contact.across[kRows - 1] * other[i];
+    AddRow(now, p, across_.data(), Real{}, contact.aside, matrix, rhs);
+  }
+
+  // A contact of that depth, whose rows are there. True: it acts.
+  bool Begin(const Substep& now, size_t p, const Real& depth, const Real* trial) {
+    Contact& contact = contacts_[p];
+    const Chain chain = contact.chain;
+    contact = Contact{};
+    contact.chain = chain;
+    contact.near = true;
+    contact.depth = depth;
+    contact.active = depth - now.ahead * Along(p, 0, trial) > 0;
+    contact.any = Any(contact.active);
+    return contact.any;
+  }
+
+  bool FindLinks(const Substep& now, const Tree<Real>& tree, const Real* trial) {
+    bool any = false;
+    links_.Find(now.physics, tree);
+    size_t spot = 0;
+    for (const Topology::Pair& pair : topology_.pairs) {
+      for (size_t k = 0; k < pair.spots; ++k, ++spot) {
+        const size_t p = topology_.points.size() + spot;
+        const typename LinkContacts<Real>::Spot& at = links_[spot];
+        contacts_[p].any = contacts_[p].near = at.any;
+        if (!at.any) continue;
+        Real* rows = &rows_[p * kRows * n_];
+        std::fill(rows, rows + kRows * n_, Real{});
+        for (size_t t = 0; t < kRows; ++t) {
+          Real* row = rows + t * n_;
+          tree.AddRow(topology_.solids[pair.second].link, at.position, at.directions[t], 1, row);
+          tree.AddRow(topology_.solids[pair.first].link, at.position, at.directions[t], -1, row);
+        }
+        any = Begin(now, p, Real{} - at.distance, trial) || any;
+      }
+    }
+    return any;
   }
 
   Real Along(size_t point, size_t direction, const Real* velocity) const {
-    const Real* row = Row(point, direction);
+    return Dot(point, Row(point, direction), velocity);
+  }
+  Real Dot(size_t point, const Real* row, const Real* velocity) const {
     Real sum{};
-    for (int i = Last(point); i >= 0; i = Ancestor(i)) sum += row[i] * velocity[i];
+    const Chain& chain = contacts_[point].chain;
+    for (int i = chain.last; i >= 0; i = chain.before[i]) sum += row[i] * velocity[i];
     return sum;
   }
 
@@ -237,13 +295,17 @@ class Constraints {
   // force = at_rest - slope * row . (v + dv), acting along the row
   void AddForce(const Substep& now, size_t point, size_t direction, const Real& at_rest,
                 const Real& slope, Real* matrix, Real* rhs) const {
-    const Real* row = Row(point, direction);
-    const Real force = now.h * (at_rest - slope * Along(point, direction, now.v));
-    for (int i = Last(point); i >= 0; i = Ancestor(i)) {
+    AddRow(now, point, Row(point, direction), at_rest, slope, matrix, rhs);
+  }
+  void AddRow(const Substep& now, size_t point, const Real* row, const Real& at_rest,
+              const Real& slope, Real* matrix, Real* rhs) const {
+    const Real force = now.h * (at_rest - slope * Dot(point, row, now.v));
+    const Chain& chain = contacts_[point].chain;
+    for (int i = chain.last; i >= 0; i = chain.before[i]) {
       const Real scaled = now.h * slope * row[i];
       rhs[i] += row[i] * force;
       Real* entries = matrix + static_cast<size_t>(i) * n_;
-      for (int j = i; j >= 0; j = Ancestor(j)) entries[j] += scaled * row[j];
+      for (int j = i; j >= 0; j = chain.before[j]) entries[j] += scaled * row[j];
     }
   }
 
@@ -251,10 +313,13 @@ class Constraints {
   bool rubs_, stops_;
   size_t n_;
   std::vector<Real> shift_;  // of the velocities, by friction
-  std::vector<Real> rubbed_,
-      outcome_;  // joint friction per speed in the latest trial; speed that it will leave
-  std::vector<Contact> contacts_;
-  std::vector<Real> rows_;  // the contacts' Jacobians
+  // Of joints in the latest trial: friction per speed where they stick, friction where they slide,
+  // and the speed that it will leave.
+  std::vector<Real> rubbed_, pushed_, outcome_;
+  LinkContacts<Real> links_;
+  std::vector<Contact> contacts_;  // of points with the ground, then of links with each other
+  std::vector<Real> rows_;         // the contacts' Jacobians
+  std::vector<Real> across_;       // a row of them, across the motion
 };
 
 }  // namespace plumb

@@ -53,6 +53,7 @@ class EngineOf : public Engine {
     stepper_.physics.links.resize(topology.joints.size());
     stepper_.physics.axes.resize(static_cast<size_t>(topology.velocities));
     stepper_.physics.points.resize(topology.points.size());
+    stepper_.physics.solids.resize(topology.solids.size());
     for (const Topology::Joint& joint : topology.joints) {
       if (joint.type != JointDescription::Type::kSpherical) continue;
       stepper_.q[static_cast<size_t>(joint.position)] += 1;  // the unit quaternion

@@ -39,10 +39,16 @@ struct Physics {
     Real position[3];  ///< [m] from its link's origin
     Real radius;       ///< [m]
   };
+  struct Solid {       ///< a shape that may touch others: see PlacedSolid
+    Real position[3];  ///< [m] of its centre, from its link's origin
+    Real half[3];      ///< [m] along its own axes
+    Real radius;       ///< [m]
+  };
 
   std::vector<Link> links;                  ///< one per joint: the link that it moves
   std::vector<JointDynamicsOf<Real>> axes;  ///< one per velocity: its joint's
   std::vector<Point> points;
+  std::vector<Solid> solids;
   WorldOf<Real> world;
 };
 
@@ -64,6 +70,7 @@ void SetLane(const Physics<double>& narrow, int lane, Physics<Real>* wide) {
   internal::SetLane<Real>(wide->links.data(), narrow.links.data(), narrow.links.size(), lane);
   internal::SetLane<Real>(wide->axes.data(), narrow.axes.data(), narrow.axes.size(), lane);
   internal::SetLane<Real>(wide->points.data(), narrow.points.data(), narrow.points.size(), lane);
+  internal::SetLane<Real>(wide->solids.data(), narrow.solids.data(), narrow.solids.size(), lane);
   internal::SetLane<Real>(&wide->world, &narrow.world, 1, lane);
 }
 

@@ -4,56 +4,9 @@
 
 #include "sim/dynamics/physics.h"
 #include "sim/dynamics/topology.h"
+#include "sim/dynamics/vector.h"
 
 namespace plumb {
-
-/// Three numbers and what mechanics does with them.
-template <class Real>
-struct Vector {
-  Real x, y, z;
-
-  friend Vector operator+(const Vector& a, const Vector& b) {
-    return {a.x + b.x, a.y + b.y, a.z + b.z};
-  }
-  friend Vector operator-(const Vector& a, const Vector& b) {
-    return {a.x - b.x, a.y - b.y, a.z - b.z};
-  }
-  friend Vector operator*(const Real& s, const Vector& a) { return {s * a.x, s * a.y, s * a.z}; }
-  void operator+=(const Vector& b) { x += b.x, y += b.y, z += b.z; }
-  Real Dot(const Vector& b) const { return x * b.x + y * b.y + z * b.z; }
-  Vector Cross(const Vector& b) const {
-    return {y * b.z - z * b.y, z * b.x - x * b.z, x * b.y - y * b.x};
-  }
-  template <class Other>
-  static Vector From(const Other* numbers) {
-    Vector vector{};
-    vector.x += numbers[0], vector.y += numbers[1], vector.z += numbers[2];
-    return vector;
-  }
-};
-
-/// A rotation by its columns: the axes it makes of x, y and z.
-template <class Real>
-struct Rotation {
-  Vector<Real> x, y, z;
-
-  Vector<Real> operator*(const Vector<Real>& a) const { return a.x * x + a.y * y + a.z * z; }
-  Rotation operator*(const Rotation& b) const { return {*this * b.x, *this * b.y, *this * b.z}; }
-};
-
-/// A symmetric matrix.
-template <class Real>
-struct Symmetric {
-  Real xx, yy, zz, xy, xz, yz;
-
-  Vector<Real> operator*(const Vector<Real>& a) const {
-    return {xx * a.x + xy * a.y + xz * a.z, xy * a.x + yy * a.y + yz * a.z,
-            xz * a.x + yz * a.y + zz * a.z};
-  }
-  void operator+=(const Symmetric& b) {
-    xx += b.xx, yy += b.yy, zz += b.zz, xy += b.xy, xz += b.xz, yz += b.yz;
-  }
-};
 
 /// Equations of motion of a tree in space: as PlanarTree, in three dimensions. Not thread-safe. The
 /// topology must outlive it.
@@ -229,12 +182,32 @@ class SpatialTree {
     Vector<Real> spot = link.position - links_[static_cast<size_t>(topology_.anchor)].position +
                         link.rotation * Vector<Real>::From(sphere.position);
     spot.z -= sphere.radius;
-    for (int i = LastVelocity(carrier); i >= 0; i = topology_.ancestors[static_cast<size_t>(i)]) {
+    for (int i = topology_.LastVelocity(carrier); i >= 0;
+         i = topology_.ancestors[static_cast<size_t>(i)]) {
       const auto at = static_cast<size_t>(i);
       const Vector<Real> velocity = columns_[at].linear + columns_[at].angular.Cross(spot);
       rows[at] = velocity.z;
       rows[n + at] = velocity.x;
       rows[2 * n + at] = velocity.y;
+    }
+  }
+
+  /// A link's axes and origin [m], in the world.
+  const Rotation<Real>& Turned(int link) const {
+    return links_[static_cast<size_t>(link)].rotation;
+  }
+  const Vector<Real>& Origin(int link) const { return links_[static_cast<size_t>(link)].position; }
+
+  /// Adds to a row of n what a spot's [m] velocity along a direction is, times `sign`, where it
+  /// moves with a link.
+  void AddRow(int link, const Vector<Real>& spot, const Vector<Real>& direction, double sign,
+              Real* row) const {
+    const Vector<Real> arm = spot - links_[static_cast<size_t>(topology_.anchor)].position;
+    for (int i = topology_.LastVelocity(link); i >= 0;
+         i = topology_.ancestors[static_cast<size_t>(i)]) {
+      const auto at = static_cast<size_t>(i);
+      const Vector<Real> velocity = columns_[at].linear + columns_[at].angular.Cross(arm);
+      row[at] += sign * velocity.Dot(direction);
     }
   }
 
@@ -258,12 +231,6 @@ class SpatialTree {
     Vector<Real> moment, force;  // first moment of mass, or moment of the force
     Symmetric<Real> inertia;
   };
-
-  int LastVelocity(int link) const {
-    if (link == 0) return -1;
-    const Topology::Joint& joint = topology_.joints[static_cast<size_t>(link - 1)];
-    return joint.velocity + (joint.type == JointDescription::Type::kSpherical ? 2 : 0);
-  }
 
   static Rotation<Real> Turn(const double* axis, const Real& angle) {
     Real s, c;

@@ -17,15 +17,13 @@ namespace plumb {
 /// and contacts taken at the end of the substep and linearised in the velocity there ("linearly
 /// implicit"), so that stiff ones need no shorter substeps:
 ///   (M + h D + ...) dv = h (effort - bias - D v + ...)
-/// Stops, friction and contacts are settled in two to four trials after the free motion, see
+/// Stops, friction and contacts are settled in a few trials after the free motion, see
 /// Constraints. Not thread-safe. The topology must outlive it.
 ///
 /// Real is double or a pack. Every lane has the bits it would have alone.
 template <class Real, template <class> class Tree>
 class Stepper {
  public:
-  static constexpr int kFewestTrials = 2, kMaxTrials = 4;  ///< of stops, friction and contacts
-
   Stepper(const Topology& topology, const SimulationSettings& settings, const Terms& terms)
       : topology_(topology),
         settings_(settings),
@@ -66,7 +64,7 @@ class Stepper {
     tree_.MoveTo(physics, q.data());
     AssembleSmooth(h, effort);
     matrix_ = smooth_;
-    cholesky_.Factorize(topology_.ancestors, matrix_.data());
+    cholesky_.Factorize(topology_.pattern, matrix_.data());
     Solve(h);
     if (leapfrog_ && topology_.coriolis) {
       // The bias of the velocity half-way, to be of second order in that, too.
@@ -82,7 +80,7 @@ class Stepper {
         shift_[i] = physics.axes[i].motor_gain * moment[i];
         if (gears_lose_) shift_[i] -= GearLoss(physics.axes[i], shift_[i]);
       }
-      cholesky_.Solve(topology_.ancestors, matrix_.data(), shift_.data());
+      cholesky_.Solve(topology_.pattern, matrix_.data(), shift_.data());
     }
     Constrain(h);
     for (size_t i = 0; i < n_; ++i) v[i] += change_[i];
@@ -97,7 +95,7 @@ class Stepper {
     tree_.MoveTo(physics, q.data());
     AssembleSmooth(Real{}, effort);
     matrix_ = smooth_;
-    cholesky_.Factorize(topology_.ancestors, matrix_.data());
+    cholesky_.Factorize(topology_.pattern, matrix_.data());
     Solve(Real{} + 1);
     return change_.data();
   }
@@ -130,7 +128,7 @@ class Stepper {
   /// The change of velocities that an impulse makes, at the q of the latest Acceleration.
   const Real* Response(const Real* impulse) {
     for (size_t i = 0; i < n_; ++i) change_[i] = impulse[i];
-    cholesky_.Solve(topology_.ancestors, matrix_.data(), change_.data());
+    cholesky_.Solve(topology_.pattern, matrix_.data(), change_.data());
     return change_.data();
   }
 
@@ -238,7 +236,7 @@ class Stepper {
 
   void Solve(const Real& h) {
     for (size_t i = 0; i < n_; ++i) change_[i] = h * drive_[i];
-    cholesky_.Solve(topology_.ancestors, matrix_.data(), change_.data());
+    cholesky_.Solve(topology_.pattern, matrix_.data(), change_.data());
   }
 
   // Accelerations with all that acts, over one substep from here.
@@ -247,7 +245,7 @@ class Stepper {
     tree_.MoveTo(physics, q.data());
     AssembleSmooth(h, effort);
     matrix_ = smooth_;
-    cholesky_.Factorize(topology_.ancestors, matrix_.data());
+    cholesky_.Factorize(topology_.pattern, matrix_.data());
     Solve(h);
     Constrain(h);
     for (Real& change : change_) change /= h;
@@ -262,17 +260,17 @@ class Stepper {
     for (size_t i = 0; i < n_; ++i) trial_[i] = v[i] + change_[i];
     if (!constraints_.Find(now, tree_, trial_.data())) return;
     Mask<Real> open = Real{} < 1;
-    for (int trial = 1; trial <= kMaxTrials; ++trial) {
+    for (int trial = 1; trial <= constraints_.kMaxTrials; ++trial) {
       constraints_.Foresee(now, trial_.data(), cholesky_, matrix_.data());
       matrix_ = smooth_;
       for (size_t i = 0; i < n_; ++i) tried_[i] = h * drive_[i];
       constraints_.Assemble(now, trial_.data(), matrix_.data(), tried_.data());
-      cholesky_.Factorize(topology_.ancestors, matrix_.data());
-      cholesky_.Solve(topology_.ancestors, matrix_.data(), tried_.data());
+      cholesky_.Factorize(topology_.pattern, matrix_.data());
+      cholesky_.Solve(topology_.pattern, matrix_.data(), tried_.data());
       for (size_t i = 0; i < n_; ++i) change_[i] = open ? tried_[i] : change_[i];
       for (size_t i = 0; i < n_; ++i) trial_[i] = v[i] + tried_[i];
       const Mask<Real> settled = constraints_.Judge(now, trial_.data());
-      if (trial >= kFewestTrials) open = open & (settled == 0);
+      if (trial >= constraints_.kFewestTrials) open = open & (settled == 0);
       if (!Any(open)) return;
     }
   }

@@ -6,7 +6,9 @@
 #include <limits>
 #include <stdexcept>
 
+#include "robot/contact_pairs.h"
 #include "robot/contact_points.h"
+#include "sim/dynamics/narrow_phase.h"
 
 namespace plumb {
 namespace {
@@ -79,7 +81,9 @@ Topology::Topology(const RobotDescription& robot) {
   link_axes = AxesAtZero(robot);
   for (const ContactPoint& point : ContactPoints(robot)) points.push_back({point.link});
   const Vector3d normal = FindNormal(robot, link_axes);
-  planar = !normal.isZero() && (points.empty() || std::abs(normal.z()) < kParallel);
+  const ContactPairs touching = FindContactPairs(robot);
+  planar = !normal.isZero() && (points.empty() || std::abs(normal.z()) < kParallel) &&
+           touching.pairs.empty();
   if (planar) {
     world_axes = PlaneAxes(normal);
     for (Matrix3d& axes : link_axes) axes = world_axes * axes;
@@ -115,6 +119,8 @@ Topology::Topology(const RobotDescription& robot) {
     coriolis = coriolis || joint.parent != 0 || described.type == Type::kSpherical;
     joints.push_back(joint);
   }
+  AddPairs(robot, touching);
+  FindPattern();
   // The chain of slides that the robot as a whole hangs on.
   const auto children = [&](int link) {
     return std::count_if(joints.begin(), joints.end(),
@@ -123,6 +129,54 @@ Topology::Topology(const RobotDescription& robot) {
   while (anchor < static_cast<int>(n) && children(anchor) == 1 &&
          joints[static_cast<size_t>(anchor)].type == Type::kPrismatic) {
     ++anchor;
+  }
+}
+
+void Topology::AddPairs(const RobotDescription& robot, const ContactPairs& touching) {
+  for (const ContactPairs::Solid& at : touching.solids) {
+    const auto link = static_cast<size_t>(at.link);
+    Solid solid{at.link, {}};
+    Matrix3d::Map(solid.axes) = link_axes[link] * robot.links[link].collisions[at.shape].rotation;
+    solids.push_back(solid);
+  }
+  for (const auto& [first, second] : touching.pairs) {
+    const auto shape = [&](size_t solid) {
+      const ContactPairs::Solid& at = touching.solids[solid];
+      return RoundedBox(robot.links[static_cast<size_t>(at.link)].collisions[at.shape]);
+    };
+    int carrier = solids[second].link;
+    while (carrier > solids[first].link) carrier = joints[static_cast<size_t>(carrier - 1)].parent;
+    pairs.push_back({first, second, MostSpots(shape(first).half.data(), shape(second).half.data()),
+                     carrier != solids[first].link});
+  }
+}
+
+void Topology::FindPattern() {
+  const auto n = static_cast<size_t>(velocities);
+  // Of the lower triangle, row by row.
+  std::vector<std::vector<bool>> filled(n, std::vector<bool>(n));
+  const auto fill = [&](size_t row, int from) {
+    for (int j = from; j >= 0; j = ancestors[static_cast<size_t>(j)])
+      filled[row][static_cast<size_t>(j)] = true;
+  };
+  for (size_t i = 0; i < n; ++i) fill(i, ancestors[i]);
+  for (const Pair& pair : pairs) {
+    if (!pair.couples) continue;
+    const int first = LastVelocity(solids[pair.first].link),
+              second = LastVelocity(solids[pair.second].link);
+    for (int i = std::max(first, second); i >= 0; i = ancestors[static_cast<size_t>(i)])
+      fill(static_cast<size_t>(i), std::min(first, second));
+  }
+  pattern.assign(n, -1);
+  for (size_t k = n; k-- > 0;) {
+    for (size_t j = 0; j < k; ++j) {
+      if (filled[k][j]) pattern[k] = static_cast<int>(j);
+    }
+    // What eliminating this row adds to the next.
+    for (int j = 0; j < pattern[k]; ++j) {
+      const auto at = static_cast<size_t>(j);
+      if (filled[k][at]) filled[static_cast<size_t>(pattern[k])][at] = true;
+    }
   }
 }
 

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "robot/contact_pairs.h"
 #include "robot/description.h"
 
 namespace plumb {
@@ -30,14 +31,32 @@ struct Topology {
     int link;  ///< as in Joint::parent
   };
 
+  /// A shape that may touch those of other links.
+  struct Solid {
+    int link;        ///< as in Joint::parent
+    double axes[9];  ///< of its box in working axes at q = 0, columns first: constant in the link
+  };
+  struct Pair {
+    size_t first, second;  ///< solids that may touch, of the lower link first
+    size_t spots;          ///< where they do so at once, at most
+    /// Neither link carries the other: their contact couples velocities of two branches.
+    bool couples;
+  };
+
   std::vector<Joint> joints;
   std::vector<Point> points;
+  std::vector<Solid> solids;
+  std::vector<Pair> pairs;
   /// For each velocity the one of the nearest joint axis on the way to the base, -1 at its end:
   /// where the mass matrix may differ from zero (Featherstone, "Rigid Body Dynamics Algorithms",
   /// 2008, section 6.3).
   std::vector<int> ancestors;
+  /// The same of the matrix with contacts, where those of two branches couple their velocities
+  /// (the elimination tree: Liu, "The role of elimination trees in sparse factorization", 1990).
+  std::vector<int> pattern;
   int positions = 0, velocities = 0;
-  bool planar = false;    ///< all joints move in one plane; if there are points, an upright one
+  /// All joints move in one plane, if there are points an upright one, and there are no pairs.
+  bool planar = false;
   bool coriolis = false;  ///< accelerations depend on velocities
   /// Link whose origin sums of moments refer to: the one that carries the robot through space, else
   /// the base. Far from the world's origin nothing is lost to cancellation.
@@ -50,8 +69,19 @@ struct Topology {
   /// In which a contact point can be pushed: upwards, and along the ground.
   int contact_directions() const { return planar ? 2 : 3; }
 
+  /// The last of the velocities that move a link; -1 for the base.
+  int LastVelocity(int link) const {
+    if (link == 0) return -1;
+    const Joint& joint = joints[static_cast<size_t>(link - 1)];
+    return joint.velocity + (joint.type == JointDescription::Type::kSpherical ? 2 : 0);
+  }
+
   /// @throws std::invalid_argument unless joint i moves link i + 1 and hangs on a link before it.
   explicit Topology(const RobotDescription& description);
+
+ private:
+  void AddPairs(const RobotDescription& robot, const ContactPairs& touching);
+  void FindPattern();
 };
 
 }  // namespace plumb

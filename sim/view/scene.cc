@@ -28,6 +28,15 @@ Shape Stick(const Eigen::Vector3d& end) {
           Eigen::Vector3d(kStick, end.norm(), 0)};
 }
 
+/// A mesh, to look at.
+Shape BoxAround(const Shape& mesh) {
+  Eigen::Vector3d low = mesh.corners.front(), high = low;
+  for (const Eigen::Vector3d& corner : mesh.corners)
+    low = low.cwiseMin(corner), high = high.cwiseMax(corner);
+  return {Shape::Type::kBox, mesh.position + mesh.rotation * (low + high) / 2, mesh.rotation,
+          high - low};
+}
+
 }  // namespace
 
 std::vector<std::vector<Shape>> ShapesOf(const RobotDescription& robot) {
@@ -35,6 +44,9 @@ std::vector<std::vector<Shape>> ShapesOf(const RobotDescription& robot) {
   bool any = false;
   for (const LinkDescription& link : robot.links) {
     shapes.push_back(link.visuals.empty() ? link.collisions : link.visuals);
+    for (Shape& shape : shapes.back()) {
+      if (shape.type == Shape::Type::kMesh) shape = BoxAround(shape);
+    }
     any = any || !shapes.back().empty();
   }
   if (any) return shapes;
@@ -123,6 +135,8 @@ std::vector<Silhouette> Scene::Look(const Eigen::Ref<const Eigen::VectorXd>& q) 
                                        corner & 4 ? 0.5 : -0.5);
             points.push_back(Project(center + axes * shape.size.cwiseProduct(sign)));
           }
+          break;
+        case Shape::Type::kMesh:  // is a box here
           break;
       }
       // x to the right is seen from -y, y to the right from +x.

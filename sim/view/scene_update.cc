@@ -69,6 +69,8 @@ class Entity {
       case Shape::Type::kCylinder:
         return Append(cylinders_, center, axes, {2 * radius, 2 * radius, length}, color,
                       R"("bottom_scale":1,"top_scale":1,)");
+      case Shape::Type::kMesh:  // is a box here
+        return;
     }
   }
 

@@ -38,6 +38,7 @@ class OdeBackend : public PhysicsBackend {
       : links_(robot.links), kinematics_(robot), points_(ContactPoints(robot)) {
     RequireHingesAndSlides(robot);
     RequireKnownJoints(robot);
+    RequireNoLinkContact(robot);
     Initialise();
     world_.reset(dWorldCreate());
     touching_.reset(dJointGroupCreate(0));

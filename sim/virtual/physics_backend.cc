@@ -24,6 +24,11 @@ void RequireKnownJoints(const RobotDescription& robot) {
   }
 }
 
+void RequireNoLinkContact(const RobotDescription& robot) {
+  if (!robot.simulation.link_pairs.empty())
+    throw std::invalid_argument("contact of links with each other or with shapes of the base");
+}
+
 void RequireState(const PhysicsBackend::Vector& q, const PhysicsBackend::Vector& v,
                   Eigen::Index positions, Eigen::Index velocities) {
   if (q.size() != positions || v.size() != velocities) {

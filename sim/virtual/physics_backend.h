@@ -33,6 +33,10 @@ void RequireHingesAndSlides(const RobotDescription& robot);
 /// @throws std::invalid_argument naming the first thing else that one of the robot's joints has.
 void RequireKnownJoints(const RobotDescription& robot);
 
+/// Thread-safe. @throws std::invalid_argument if links are to touch each other, or what the base
+/// carries.
+void RequireNoLinkContact(const RobotDescription& robot);
+
 /// Thread-safe. @throws std::invalid_argument unless q and v have so many entries, all finite.
 void RequireState(const PhysicsBackend::Vector& q, const PhysicsBackend::Vector& v,
                   Eigen::Index positions, Eigen::Index velocities);

@@ -21,6 +21,7 @@ using Eigen::VectorXd;
 void RequireKnown(const RobotDescription& robot) {
   RequireHingesAndSlides(robot);
   RequireKnownJoints(robot);
+  RequireNoLinkContact(robot);
   for (const ContactPoint& point : ContactPoints(robot)) {
     if (point.radius > 0) continue;
     throw std::invalid_argument("the edges of link '" +

@@ -12,6 +12,8 @@
 #include "records/message_definitions.h"
 #include "robot/parameter_distribution.h"
 #include "robot/physics_fingerprint.h"
+#include "tests/replaced.h"
+#include "tests/robot/zoo.h"
 #include "tests/temporary_folder.h"
 
 namespace plumb {
@@ -41,6 +43,27 @@ TEST_CASE("a log's folder has the robot, whatever its file extends, to the last 
   record.reset();
   record.emplace(log, About{"plumb 1", "plumb record", "", "real", log + ".d"});  // over itself
   CHECK(PhysicsFingerprint(LoadRobot(log + ".d")) == PhysicsFingerprint(was));
+}
+
+TEST_CASE("a log's folder has the robot's collision meshes") {
+  const RobotFolder robot(Replaced(kZooUrdf, "thigh.dae", "leg/thigh.obj"), kZooToml);
+  fs::create_directory(robot.path() + "/leg");
+  std::ofstream(robot.path() + "/leg/thigh.obj")
+      << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\n";
+  const RobotDescription was = LoadRobot(robot.path());
+  REQUIRE(was.meshes.size() == 1);
+  const TemporaryFolder folder;
+  const std::string log = folder / "run.lcmlog";
+  const RecordFolder::About about{"plumb 1", "plumb record", "", "real", robot.path()};
+  std::optional<RecordFolder> record(std::in_place, log, about);
+  fs::remove_all(robot.path() + "/leg");
+  CHECK(PhysicsFingerprint(LoadRobot(log + ".d")) == PhysicsFingerprint(was));
+  record.reset();
+  record.emplace(log, RecordFolder::About{"plumb 1", "", "", "real", log + ".d"});  // over itself
+  CHECK(PhysicsFingerprint(LoadRobot(log + ".d")) == PhysicsFingerprint(was));
+  record.reset();
+  record.emplace(log, RecordFolder::About{"plumb 1", "", "", "real", ""});
+  CHECK_FALSE(fs::exists(log + ".d/meshes"));
 }
 
 TEST_CASE("what was recorded is said, and what an earlier recording has left is gone") {

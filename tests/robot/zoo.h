@@ -31,7 +31,7 @@ inline const std::string kZooUrdf = R"(<?xml version="1.0"?>
       <origin xyz="0 0 -0.2" rpy="0 0 0"/>
       <geometry><capsule radius="0.04" length="0.3"/></geometry>
     </collision>
-    <collision><geometry><mesh filename="thigh.stl"/></geometry></collision>
+    <collision><geometry><mesh filename="thigh.dae"/></geometry></collision>
     <collision><geometry><cylinder radius="0.05" length="0.2"/></geometry></collision>
   </link>
   <link name="slider"/>

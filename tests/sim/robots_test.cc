@@ -17,8 +17,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kPi = std::numbers::pi;
-
 RobotDescription LoadExample(const std::string& name) {
   return LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/" + name);
 }
@@ -41,9 +39,9 @@ TEST_CASE("the hopper is gym's") {
       CHECK(joint.dynamics.damping == (i < 3 ? 0 : 1));
       CHECK(joint.effort_limit == (i < 3 ? 0 : 200));
     }
-    CHECK(hopper.joints[3].lower == Approx(-150 * kPi / 180).epsilon(1e-15));
+    CHECK(hopper.joints[3].lower == Approx(-150 * std::numbers::pi / 180).epsilon(1e-15));
     CHECK(hopper.joints[4].upper == 0);
-    CHECK(hopper.joints[5].upper == Approx(kPi / 4).epsilon(1e-15));
+    CHECK(hopper.joints[5].upper == Approx(std::numbers::pi / 4).epsilon(1e-15));
     CHECK(hopper.task.period == 0.008);
     CHECK(hopper.task.steps == 1000);
     REQUIRE(hopper.simulation.contact);
@@ -61,7 +59,8 @@ TEST_CASE("the hopper is gym's") {
       const Shape& shape = link.visuals[0];
       REQUIRE(shape.type == Shape::Type::kCapsule);
       const double r = shape.size[0], l = shape.size[1];
-      const double cylinder = 1000 * kPi * r * r * l, caps = 1000 * 4.0 / 3 * kPi * r * r * r;
+      const double cylinder = 1000 * std::numbers::pi * r * r * l,
+                   caps = 1000 * 4.0 / 3 * std::numbers::pi * r * r * r;
       const double along = cylinder * r * r / 2 + caps * 2 / 5 * r * r;
       const double across = cylinder * (l * l / 12 + r * r / 4) +
                             caps * (83.0 / 320 * r * r + std::pow(l / 2 + 3.0 / 8 * r, 2));

@@ -191,6 +191,23 @@ TEST_CASE("lanes: trees in space, too") {
   CHECK(tally.finite > 0.6 * tally.compared);
 }
 
+TEST_CASE("lanes: links that touch each other, too") {
+  Random random(3);
+  Tally tally;
+  int robots = 0;
+  for (uint64_t seed = 0; seed < 40; ++seed) {
+    INFO("seed " << seed);
+    RobotDescription robot = Everything(FromUrdf(TreeWriter(seed).Spatial(8)), random);
+    Shape block{.type = Shape::Type::kBox, .size = {0.5, 0.5, 0.5}};
+    robot.links[0].collisions.push_back(block);
+    robot.simulation.link_pairs = {{"*", "*"}};
+    CompareAll(robot, random, &tally);
+    robots += Model(robot).topology().pairs.size() > 1;
+  }
+  CHECK(robots > 20);
+  CHECK(tally.finite > 0.6 * tally.compared);
+}
+
 TEST_CASE("lanes: a lane is only its own") {
   const Model model(LoadExample("hopper"));
   const std::unique_ptr<Engine> wide = model.NewWideEngine();

@@ -44,22 +44,23 @@ TEST_CASE("silhouettes have the shapes' size") {
       low = low.cwiseMin(point), high = high.cwiseMax(point);
     return Eigen::Vector4d(low.x(), high.x(), low.y(), high.y());
   };
-  using Type = Shape::Type;
+  using Solid = Shape::Type;
   // A rod of 1 m and 2 cm radius on a pivot at 1.2 m.
   CHECK((extent(0, 0) - Eigen::Vector4d(-0.02, 0.02, 1.2, 2.2)).norm() < 1e-9);
   CHECK((extent(M_PI / 2, 0) - Eigen::Vector4d(0, 1, 1.18, 1.22)).norm() < 1e-9);
   // it points at us
   CHECK((extent(M_PI / 2, 1) - Eigen::Vector4d(-0.02, 0.02, 1.18, 1.22)).norm() < 1e-9);
-  robot.links[1].visuals[0].type = Type::kCapsule;
+  robot.links[1].visuals[0].type = Solid::kCapsule;
   CHECK((extent(0, 0) - Eigen::Vector4d(-0.02, 0.02, 1.18, 2.22)).norm() < 1e-9);
-  robot.links[1].visuals[0] = {Type::kBox, {0, 0, 0.5}, Eigen::Matrix3d::Identity(), {0.2, 0.4, 1}};
+  robot.links[1].visuals[0] = {
+      Solid::kBox, {0, 0, 0.5}, Eigen::Matrix3d::Identity(), {0.2, 0.4, 1}};
   CHECK((extent(0, 0) - Eigen::Vector4d(-0.1, 0.1, 1.2, 2.2)).norm() < 1e-9);
   CHECK((extent(0, 1) - Eigen::Vector4d(-0.2, 0.2, 1.2, 2.2)).norm() < 1e-9);
   robot.links[1].visuals.clear();
   // a stick, to twice the centre
   CHECK((extent(0, 0) - Eigen::Vector4d(-0.02, 0.02, 1.18, 2.22)).norm() < 1e-9);
   robot.links[1].collisions = {
-      {Type::kSphere, {0, 0, 0.5}, Eigen::Matrix3d::Identity(), {0.3, 0, 0}}};
+      {Solid::kSphere, {0, 0, 0.5}, Eigen::Matrix3d::Identity(), {0.3, 0, 0}}};
   CHECK((extent(0, 0) - Eigen::Vector4d(-0.3, 0.3, 1.4, 2.0)).norm() < 1e-9);
 }
 

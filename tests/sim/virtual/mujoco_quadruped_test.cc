@@ -67,6 +67,8 @@ TEST_CASE("quadruped: in flight it moves as in MuJoCo") {
 TEST_CASE("quadruped: it comes to stand where it does in MuJoCo") {
   RobotDescription robot = Quadruped();
   robot.simulation.contact->friction = 1e-3;  // or it depended on how it came there
+  // On such ice leapfrog substeps glide on, by 6 mm/s.
+  robot.simulation.integrator = SimulationSettings::Integrator::kSemiImplicit;
   const auto engine = MakeMujocoBackend(robot);
   Simulator simulator(robot);
   const VectorXd q = Stance(robot, 0.335), none = VectorXd::Zero(18);
@@ -86,6 +88,45 @@ TEST_CASE("quadruped: it comes to stand where it does in MuJoCo") {
   // The trunk is as high above its feet, which sink in by what their grounds give way.
   CHECK(HeightAboveFeet(robot, simulator.q()) ==
         Approx(HeightAboveFeet(robot, engine->q())).margin(0.001));
+}
+
+TEST_CASE("quadruped: with its trunk on a table and its feet against each other, as in MuJoCo") {
+  RobotDescription robot = Quadruped();  // with friction, or the feet slid past each other
+  Shape table{.type = Shape::Type::kBox, .size = {0.3, 0.08, 0.6}};
+  table.position.z() = 0.3;
+  robot.links[0].collisions = {table};
+  robot.simulation.link_pairs = {{"world", "trunk"},
+                                 {"front_left_calf", "front_right_calf"},
+                                 {"rear_left_calf", "rear_right_calf"}};
+  for (JointDescription& joint : robot.joints) {
+    if (!joint.name.ends_with("_hip")) continue;
+    joint.dynamics.rest = joint.name.find("left") != std::string::npos ? -0.6 : 0.6;
+  }
+  const auto engine = MakeMujocoBackend(robot);
+  Simulator simulator(robot);
+  VectorXd q = Stance(robot, 0.67);
+  for (Eigen::Index leg = 7; leg < 19; leg += 3) q[leg] = q[leg] < 0 ? -0.37 : 0.37;  // apart
+  const VectorXd none = VectorXd::Zero(18);
+  engine->SetState(q, none);
+  simulator.SetState(q, none);
+  for (int i = 0; i < 100; ++i) {
+    REQUIRE(engine->Advance(none, 0.02));
+    simulator.Step(none, 0.02);
+  }
+  CHECK(simulator.v().norm() < 1e-3);
+  // The table's and half the trunk's height, less what four corners are pressed in.
+  double mass = 0;
+  for (const LinkDescription& link : robot.links) mass += link.mass;
+  const double depth = mass * robot.simulation.gravity / (4 * robot.simulation.contact->stiffness);
+  CHECK(simulator.q()[2] == Approx(0.657 - depth).margin(2e-4));
+  CHECK(engine->q()[2] == Approx(0.657).margin(0.0011));  // its contacts begin a millimetre apart
+  for (Eigen::Index i = 7; i < 19; ++i) {
+    const JointDescription& joint = robot.joints[static_cast<size_t>(i - 3)];
+    INFO(joint.name << " rests at " << joint.dynamics.rest);
+    CHECK(simulator.q()[i] == Approx(engine->q()[i]).margin(0.005));
+    if (joint.name.ends_with("_hip"))
+      CHECK(std::abs(simulator.q()[i]) < 0.5);  // they are in the way
+  }
 }
 
 }  // namespace plumb
