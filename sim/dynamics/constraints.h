@@ -72,6 +72,7 @@ class Constraints {
   /// need be assembled.
   bool Find(const Substep& now, const Tree<Real>& tree, const Real* trial) {
     bool any = rubs_;
+    first_ = true;
     std::fill(rubbed_.begin(), rubbed_.end(), Real{});
     std::fill(pushed_.begin(), pushed_.end(), Real{});
     for (const Topology::Joint& joint : topology_.joints) {
@@ -137,7 +138,10 @@ class Constraints {
     for (size_t i = 0; rubs_ && i < n_; ++i) {
       rubbed_[i] = now.friction[i] / outcome_[i];
       if constexpr (kSlides) {
-        const Truth slides = outcome_[i] > kStickSpeed;
+        // What is foreseen once is then held to what has come of it: others have changed, too.
+        const Truth slid = Abs(pushed_[i]) > 0,
+                    still = slid ? pushed_[i] * trial[i] >= 0 : Abs(trial[i]) > kStickSpeed,
+                    slides = first_ ? outcome_[i] > kStickSpeed : still;
         const Real full = trial[i] < 0 ? Real(-now.friction[i]) : now.friction[i];
         rubbed_[i] = slides ? Real{} : rubbed_[i];
         pushed_[i] = slides ? full : Real{};
@@ -146,6 +150,7 @@ class Constraints {
       matrix[i * n_ + i] += now.h * rubbed_[i];
       rhs[i] -= now.h * rubbed_[i] * now.v[i];
     }
+    first_ = false;
     for (const Topology::Joint& joint : topology_.joints) {
       if (!HasStop(joint)) continue;
       const auto i = static_cast<size_t>(joint.velocity);
@@ -316,6 +321,7 @@ class Constraints {
   // Of joints in the latest trial: friction per speed where they stick, friction where they slide,
   // and the speed that it will leave.
   std::vector<Real> rubbed_, pushed_, outcome_;
+  bool first_ = true;  // no trial has been assembled yet
   LinkContacts<Real> links_;
   std::vector<Contact> contacts_;  // of points with the ground, then of links with each other
   std::vector<Real> rows_;         // the contacts' Jacobians
