@@ -105,6 +105,32 @@ TEST_CASE("what is no mesh is refused") {
   refused(text.substr(0, text.rfind("  vertex")) + "endsolid", "cut short");
 }
 
+TEST_CASE("whatever its bytes are, a mesh is read or refused") {
+  Random random(4);
+  int read = 0, refused = 0;
+  for (const std::string& good :
+       {BinaryStl(BoxTriangles()), TextStl(BoxTriangles()), std::string(kObj)}) {
+    for (int i = 0; i < 3000; ++i) {
+      std::string text = good;
+      const auto at = [&] {
+        return static_cast<size_t>(random.Uniform(0, static_cast<double>(text.size())));
+      };
+      for (int k = 0; k < 1 + i % 8; ++k) text[at()] = static_cast<char>(random.Uniform(-128, 128));
+      if (i % 3 == 0) text.resize(at());
+      try {
+        for (const Vector3d& point : MeshPoints(text)) REQUIRE(point.allFinite());
+        FindHullCorners(MeshPoints(text));
+        ++read;
+      } catch (const std::runtime_error& error) {
+        REQUIRE(std::string(error.what()).size() < 100);
+        ++refused;
+      }
+    }
+  }
+  CHECK(read > 1000);
+  CHECK(refused > 3000);
+}
+
 TEST_CASE("the corners of a hull reach as far as all points") {
   const HullCorners box = FindHullCorners(MeshPoints(BinaryStl(BoxTriangles())));
   CHECK(box.corners.size() == 8);

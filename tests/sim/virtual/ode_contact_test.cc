@@ -4,7 +4,9 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "sim/virtual/mujoco_backend.h"
 #include "sim/virtual/ode_backend.h"
+#include "sim/virtual/simbody_backend.h"
 #include "sim/virtual/virtual_plant.h"
 #include "tests/sim/virtual/advance.h"
 #include "tests/sim/virtual/ball.h"
@@ -111,4 +113,15 @@ TEST_CASE("ode's engine: a stop gives way as its stiffness says") {
 }
 
 }  // namespace
+TEST_CASE("engines that know the ground alone refuse links that touch each other") {
+  RobotDescription hopper = Known("hopper");
+  hopper.links[0].collisions.push_back({.type = Shape::Type::kBox, .size = {1, 1, 1}});
+  hopper.simulation.link_pairs = {{hopper.links[0].name, hopper.links.back().name}};
+  using Catch::Contains;
+  const std::string what = "contact of links with each other or with shapes of the base";
+  CHECK_THROWS_WITH(MakeOdeBackend(hopper), Contains(what));
+  CHECK_THROWS_WITH(MakeSimbodyBackend(hopper), Contains(what));
+  CHECK_NOTHROW(MakeMujocoBackend(hopper));
+}
+
 }  // namespace plumb
