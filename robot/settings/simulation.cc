@@ -10,7 +10,7 @@
 namespace plumb {
 namespace {
 
-constexpr size_t kMostPairs = 1000;
+constexpr size_t kMostPairTables = 1000;
 
 // Gravity may be left out; of a table that is there, nothing may.
 World ReadWorld(Config& simulation, Config& contact, Config& limit,
@@ -36,8 +36,8 @@ std::vector<SimulationSettings::LinkPair> ReadLinkPairs(Config& contact) {
     if (links.size() != 2) pair.Fail("links", "must name two links that touch each other");
     pairs.push_back({links[0], links[1], pair.Position("links")});
     pair.Finish();
-    if (pairs.size() > kMostPairs)
-      pair.Fail("links", fmt::format("is one of more than {}", kMostPairs));
+    if (pairs.size() > kMostPairTables)
+      pair.Fail("links", fmt::format("is one of more than {}", kMostPairTables));
   }
   return pairs;
 }

@@ -108,7 +108,7 @@ std::vector<Vector3d> OfObj(const std::string& text) {
       std::from_chars(one.data(), one.data() + one.size(), index);
       if (index < 0) index += count + 1;
       if (index < 1 || index > count) {
-        throw std::runtime_error("has a face of a vertex that is not there in line " +
+        throw std::runtime_error("has a face with an unknown vertex in line " +
                                  std::to_string(number));
       }
       points.push_back(vertices[static_cast<size_t>(index - 1)]);

@@ -12,7 +12,7 @@ bool IsMeshFormat(const std::string& file);
 /// Points that a mesh's faces have for corners, each once.
 /// @param text an STL file, binary or of text, or a Wavefront OBJ file.
 /// @throws std::runtime_error saying what is wrong, if it is neither, is an STL cut short, has no
-/// face, one of a vertex that is not there, or a coordinate that is beyond 1e6 or not a number.
+/// face, a face with an unknown vertex, or a coordinate that is beyond 1e6 or not a number.
 /// Thread-safe.
 std::vector<Eigen::Vector3d> MeshPoints(const std::string& text);
 

@@ -45,7 +45,8 @@ struct UrdfModel {
   /// Adds the hulls of the collision meshes to their links, and warnings of those whose format is
   /// not known or whose hull has too many corners. Once. Thread-safe but for the files and the
   /// environment, see FindMesh. @return the files that it read, each once.
-  /// @throws ConfigError with the line of one that is not there, cannot be read or is one too many.
+  /// @throws ConfigError with the line of a mesh whose file is missing or unreadable, or if there
+  /// are too many files.
   std::vector<std::string> LoadCollisionMeshes();
 
   /// @throws ConfigError "file:line: what"

@@ -213,7 +213,8 @@ class Constraints {
   }
 
  private:
-  static constexpr size_t kRows = 1 + Tree<Real>::kTangents;  // upwards, and along the ground
+  static constexpr size_t kRows =
+      1 + Tree<Real>::kTangents;  // along the normal, and along the surface
   using Contact = plumb::Contact<Real, kRows>;
   using Truth = Mask<Real>;
   static constexpr bool kSlides = Contact::kSlides;

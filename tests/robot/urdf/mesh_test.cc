@@ -97,9 +97,9 @@ TEST_CASE("what is no mesh is refused") {
     refused(bad, "not a number");
   }
   refused("v 0 0 0\nv 1 0 0\nv 0 1 0\n", "has no face");
-  refused("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "of a vertex that is not there in line 4");
-  refused("v 0 0 0\nf 0 1 1\n", "of a vertex that is not there in line 2");
-  refused("v 0 0 0\nf x\n", "of a vertex that is not there in line 2");
+  refused("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "face with an unknown vertex in line 4");
+  refused("v 0 0 0\nf 0 1 1\n", "face with an unknown vertex in line 2");
+  refused("v 0 0 0\nf x\n", "face with an unknown vertex in line 2");
   const std::string text = TextStl(BoxTriangles());
   refused(text.substr(0, text.find("endsolid")), "cut short");
   refused(text.substr(0, text.rfind("  vertex")) + "endsolid", "cut short");

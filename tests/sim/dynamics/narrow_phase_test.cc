@@ -183,24 +183,21 @@ TEST_CASE("narrow phase: what lies flat is held at its ends and corners") {
     });
     return at;
   };
-  SECTION("a rod on a table") {
-    const auto at = spots_of(Solid({0.1, 0, 0.049}, lying, {0, 0, 0.2}, 0.05), table);
+  const auto held = [&](const PlacedSolid& rod, const PlacedSolid& on, double begin, double end) {
+    const auto at = spots_of(rod, on);
     REQUIRE(at.size() == 2);
-    CHECK(at[0].x() == Approx(-0.1));
-    CHECK(at[1].x() == Approx(0.3));
+    CHECK(at[0].x() == Approx(begin));
+    CHECK(at[1].x() == Approx(end));
+  };
+  SECTION("a rod on a table") {
+    held(Solid({0.1, 0, 0.049}, lying, {0, 0, 0.2}, 0.05), table, -0.1, 0.3);
   }
   SECTION("a rod across a narrow table is held by its edges") {
-    const auto at = spots_of(Solid({0.1, 0, 0.049}, lying, {0, 0, 2}, 0.05), table);
-    REQUIRE(at.size() == 2);
-    CHECK(at[0].x() == Approx(-0.5));
-    CHECK(at[1].x() == Approx(0.5));
+    held(Solid({0.1, 0, 0.049}, lying, {0, 0, 2}, 0.05), table, -0.5, 0.5);
   }
   SECTION("a rod on a rod") {
     const PlacedSolid rod = Solid(Vector3d::Zero(), lying, {0, 0, 0.2}, 0.05);
-    const auto at = spots_of(Solid({0.1, 0, 0.099}, lying, {0, 0, 0.2}, 0.05), rod);
-    REQUIRE(at.size() == 2);
-    CHECK(at[0].x() == Approx(-0.1));
-    CHECK(at[1].x() == Approx(0.2));
+    held(Solid({0.1, 0, 0.099}, lying, {0, 0, 0.2}, 0.05), rod, -0.1, 0.2);
   }
   SECTION("a box on a table") {
     const auto at = spots_of(Solid({0, 0, 0.049}, straight, {0.1, 0.2, 0.05}, 0), table);

@@ -43,6 +43,17 @@ double HeightAboveFeet(const RobotDescription& robot, const VectorXd& q) {
   return sum / feet;
 }
 
+/// Both begin there, at rest, and are left alone for so long [s].
+void Settle(const VectorXd& q, double duration, PhysicsBackend* engine, Simulator* simulator) {
+  const VectorXd none = VectorXd::Zero(18);
+  engine->SetState(q, none);
+  simulator->SetState(q, none);
+  for (double t = 0; t < duration - 1e-9; t += 0.02) {
+    REQUIRE(engine->Advance(none, 0.02));
+    simulator->Step(none, 0.02);
+  }
+}
+
 }  // namespace
 
 TEST_CASE("quadruped: in flight it moves as in MuJoCo") {
@@ -71,13 +82,7 @@ TEST_CASE("quadruped: it comes to stand where it does in MuJoCo") {
   robot.simulation.integrator = SimulationSettings::Integrator::kSemiImplicit;
   const auto engine = MakeMujocoBackend(robot);
   Simulator simulator(robot);
-  const VectorXd q = Stance(robot, 0.335), none = VectorXd::Zero(18);
-  engine->SetState(q, none);
-  simulator.SetState(q, none);
-  for (int i = 0; i < 500; ++i) {
-    REQUIRE(engine->Advance(none, 0.02));
-    simulator.Step(none, 0.02);
-  }
+  Settle(Stance(robot, 0.335), 10, engine.get(), &simulator);
   CHECK(simulator.v().norm() < 1e-3);
   CHECK(engine->v().norm() < 1e-3);
   // The legs' springs carry the same weight: what they make is the same.
@@ -106,13 +111,7 @@ TEST_CASE("quadruped: with its trunk on a table and its feet against each other,
   Simulator simulator(robot);
   VectorXd q = Stance(robot, 0.67);
   for (Eigen::Index leg = 7; leg < 19; leg += 3) q[leg] = q[leg] < 0 ? -0.37 : 0.37;  // apart
-  const VectorXd none = VectorXd::Zero(18);
-  engine->SetState(q, none);
-  simulator.SetState(q, none);
-  for (int i = 0; i < 100; ++i) {
-    REQUIRE(engine->Advance(none, 0.02));
-    simulator.Step(none, 0.02);
-  }
+  Settle(q, 2, engine.get(), &simulator);
   CHECK(simulator.v().norm() < 1e-3);
   // The table's and half the trunk's height, less what four corners are pressed in.
   double mass = 0;
