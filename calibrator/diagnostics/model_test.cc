@@ -12,6 +12,7 @@
 #include "calibrator/fit/one_step.h"
 #include "calibrator/fit/recorded_window.h"
 #include "calibrator/fit/robot_least_squares.h"
+#include "calibrator/inference/displaced.h"
 #include "common/decompositions.h"
 #include "robot/parameter_distribution.h"
 #include "sim/tasks/task.h"
@@ -64,27 +65,26 @@ class Test {
     return residuals;
   }
 
-  // By what the parameters would change with each candidate that changed, second moments added to
-  // the fit's.
+  // With what the parameters would change by, if each of the candidates changed.
   Gaussian Consider(const FitResiduals& residuals, const Misspecification& found) const {
     double best = 0;
     for (const CandidateChange& change : found.changes) best = std::max(best, change.gain);
     if (best == 0) return fit_.posterior;
+    const Gaussian prior = PriorGaussian(robot_);
     const Eigen::VectorXd squares =
         ProjectedErrors(Known(), residuals).weight.cwiseAbs2();  // outliers count less
     const Eigen::MatrixXd weighted = squares.asDiagonal() * residuals.jacobian;
-    const Eigen::MatrixXd covariance = Inverse(weighted.transpose() * residuals.jacobian +
-                                               Inverse(PriorGaussian(robot_).covariance));
-    Gaussian considered = fit_.posterior;
+    const Eigen::MatrixXd covariance =
+        Inverse(weighted.transpose() * residuals.jacobian + Inverse(prior.covariance));
+    Eigen::MatrixXd moved(prior.mean.size(), static_cast<Eigen::Index>(found.changes.size()));
+    Eigen::Index column = 0;
     for (const CandidateChange& change : found.changes) {
-      const Eigen::VectorXd moved =
-          covariance *
-          (weighted.transpose() *
-           residuals.columns.col(static_cast<Eigen::Index>(change.candidate))) *
-          change.change;
-      considered.covariance += change.gain / best * moved * moved.transpose();
+      moved.col(column++) = covariance *
+                            (weighted.transpose() *
+                             residuals.columns.col(static_cast<Eigen::Index>(change.candidate))) *
+                            change.change * std::sqrt(change.gain / best);
     }
-    return considered;
+    return Displaced(prior, fit_.posterior, moved);
   }
 
   // Errors of windows depend on their own readings, and where motion is not linear over the noise

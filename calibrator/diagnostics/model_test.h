@@ -32,9 +32,8 @@ struct TestedFit {
 struct ModelTest {
   Misspecification found;
   /// The posterior as wide as what may be wrong makes it, coordinates. Each candidate that would
-  /// explain errors takes the parameters elsewhere if it changes ("consider parameters": Schmidt,
-  /// Adv. Control Syst. 3, 1966): the squares of these displacements are added to the covariance,
-  /// each times the share of the best one's gain that its own is. The mean stays: which of the
+  /// explain errors takes the parameters elsewhere if it changes: the data's estimate is Displaced
+  /// by that, times the root of the share of the best one's gain that its own is. Which of the
   /// candidates it is, if it is one, is not known. Where nobody can tell whether the model is
   /// right, candidates are those that would explain all errors.
   Gaussian considered;

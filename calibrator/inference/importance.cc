@@ -17,16 +17,41 @@ constexpr double kWide = 4, kWider = 100;
 constexpr double kLeastWeight = 1e-3;
 constexpr double kDoubt = 0.5;  // about the guess's weights
 
-// Each component as it is, and wide. @param doubt share of the draws that go to all components
-// alike.
-GaussianMixture Proposal(const GaussianMixture& mixture, double doubt, double wide) {
+// The covariance, with its variances along the axes that it shares with the bound turned into what
+// `limited` makes of their ratio to the bound's.
+template <class Limited>
+Eigen::MatrixXd Against(const Eigen::MatrixXd& bound, const Eigen::MatrixXd& covariance,
+                        Limited limited) {
+  const Eigen::LLT<Eigen::MatrixXd> factor(bound);
+  const Eigen::MatrixXd half = factor.matrixL().solve(covariance);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ratios(
+      factor.matrixL().solve(half.transpose()));
+  const Eigen::MatrixXd axes = factor.matrixL() * ratios.eigenvectors();
+  return axes * limited(ratios.eigenvalues()).asDiagonal() * axes.transpose();
+}
+
+Eigen::MatrixXd AtLeast(const Eigen::MatrixXd& least, const Eigen::MatrixXd& covariance) {
+  return Against(least, covariance,
+                 [](const Eigen::VectorXd& ratios) { return ratios.cwiseMax(1).eval(); });
+}
+
+Eigen::MatrixXd AtMost(const Eigen::MatrixXd& most, const Eigen::MatrixXd& covariance) {
+  return Against(most, covariance,
+                 [](const Eigen::VectorXd& ratios) { return ratios.cwiseMin(1).eval(); });
+}
+
+// Each component as it is, and wide, but no wider than `widest`, if that is given. @param doubt
+// share of the draws that go to all components alike.
+GaussianMixture Proposal(const GaussianMixture& mixture, double doubt, double wide,
+                         const Eigen::MatrixXd& widest) {
   GaussianMixture proposal;
   const double alike = doubt / static_cast<double>(mixture.components.size());
   for (size_t i = 0; i < mixture.components.size(); ++i) {
     for (const double factor : {1.0, wide}) {
       proposal.weights.push_back(((1 - doubt) * mixture.weights[i] + alike) / 2);
-      proposal.components.push_back(
-          {mixture.components[i].mean, factor * mixture.components[i].covariance});
+      const Eigen::MatrixXd covariance = factor * mixture.components[i].covariance;
+      proposal.components.push_back({mixture.components[i].mean,
+                                     widest.size() > 0 ? AtMost(widest, covariance) : covariance});
     }
   }
   return proposal;
@@ -58,20 +83,11 @@ Eigen::MatrixXd Weighted(const GaussianMixture& mixture, Eigen::MatrixXd densiti
   return densities;
 }
 
-// As wide as the first in each direction, and as the second where that is wider.
-Eigen::MatrixXd AtLeast(const Eigen::MatrixXd& least, const Eigen::MatrixXd& covariance) {
-  const Eigen::LLT<Eigen::MatrixXd> factor(least);
-  const Eigen::MatrixXd half = factor.matrixL().solve(covariance);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ratios(
-      factor.matrixL().solve(half.transpose()));
-  const Eigen::MatrixXd axes = factor.matrixL() * ratios.eigenvectors();
-  return axes * ratios.eigenvalues().cwiseMax(1).asDiagonal() * axes.transpose();
-}
-
 // One step of expectation-maximisation on weighted samples. @param narrower whether a component may
-// become so.
+// become so. @param widest that one may become, if that is given.
 GaussianMixture Adapt(const GaussianMixture& mixture, const Eigen::MatrixXd& x,
-                      const Eigen::VectorXd& weights, bool narrower) {
+                      const Eigen::VectorXd& weights, bool narrower,
+                      const Eigen::MatrixXd& widest) {
   const Eigen::MatrixXd joint = Weighted(mixture, ComponentDensities(mixture, x));
   const Eigen::MatrixXd share = (joint.colwise() - LogSumExp(joint)).array().exp();
   const Eigen::Index n = x.rows();
@@ -93,6 +109,7 @@ GaussianMixture Adapt(const GaussianMixture& mixture, const Eigen::MatrixXd& x,
                                   d * old.covariance) /
                                      (ess + d);
     if (!narrower) p.covariance = AtLeast(old.covariance, p.covariance);
+    if (widest.size() > 0) p.covariance = AtMost(widest, p.covariance);
     adapted.weights.push_back(total);
     adapted.components.push_back(std::move(p));
   }
@@ -139,7 +156,9 @@ ImportanceFit FitByImportance(
   for (int round = 0; round < options.rounds || (fit.power < 1 && round < 2 * options.rounds);
        ++round) {
     const bool rough = round >= options.rounds;
-    proposals.push_back(Proposal(fit.mixture, round == 0 ? kDoubt : 0, rough ? kWider : kWide));
+    const Eigen::MatrixXd widest = rough ? options.widest : Eigen::MatrixXd();
+    proposals.push_back(
+        Proposal(fit.mixture, round == 0 ? kDoubt : 0, rough ? kWider : kWide, widest));
     Random random(options.seed, {0x1390, static_cast<uint32_t>(round)});
     Eigen::MatrixXd fresh(n, options.samples);
     for (Eigen::Index i = 0; i < fresh.cols(); ++i) fresh.col(i) = Sample(proposals.back(), random);
@@ -162,7 +181,7 @@ ImportanceFit FitByImportance(
     fit.heaviest = fit.weights.maxCoeff();
     fit.power = PowerFor(kLeastEss * static_cast<double>(n + 1), log_weights);
     if (fit.power < 1) fit.weights = Normalised(fit.power * log_weights);
-    fit.mixture = Adapt(fit.mixture, fit.samples, fit.weights, fit.power == 1 || !rough);
+    fit.mixture = Adapt(fit.mixture, fit.samples, fit.weights, fit.power == 1 || !rough, widest);
   }
   return fit;
 }

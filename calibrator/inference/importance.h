@@ -14,6 +14,7 @@ struct ImportanceOptions {
   int samples = 400;  ///< a round
   int rounds = 4;     ///< twice as many where the density is rough
   uint64_t seed = 1;
+  Eigen::MatrixXd widest = {};  ///< n x n; see below. Empty: no bound
 };
 
 struct ImportanceFit {
@@ -35,8 +36,10 @@ struct ImportanceFit {
 /// that makes so many count (Koblents and Miguez, Statistics and Computing 25, 2015): proposals
 /// then find their way, rather than one sample. If that is so after all rounds, the density has
 /// more peaks than samples can tell apart: up to as many rounds more are made, with proposals of
-/// 100 times the variance for half of the draws, and no component becomes narrower. What comes of
-/// it lies between proposals and target: wide rather than sure of a peak that a sample has met.
+/// 100 times the variance for half of the draws, yet in no direction wider than `widest`, and no
+/// component becomes narrower. What comes of it lies between proposals and target: wide rather than
+/// sure of a peak that a sample has met, and, if `widest` is the prior's covariance, no wider than
+/// one who has seen nothing.
 /// Everything that is not finite has density zero.
 /// @param log_density of n x N points.
 /// @throws std::invalid_argument if no sample has any density.

@@ -142,7 +142,9 @@ TEST_CASE("touching steps with what no contact can do leave free motion alone to
   REQUIRE(gap.alarm.alarm);
   CHECK(gap.gap.informed == Informed::kFree);
   const Closed in_the_air = Close(robot, FreeSteps(robot, log));
-  CHECK(Moments(gap.result.posterior).mean == Moments(in_the_air.alone.posterior).mean);
+  const Gaussian informed = Moments(gap.result.posterior);
+  const Eigen::VectorXd off = informed.mean - Moments(in_the_air.alone.posterior).mean;
+  CHECK((off.cwiseAbs().array() < 0.5 * informed.covariance.diagonal().array().sqrt()).all());
 }
 
 TEST_CASE("friction in free motion: the prior stays, and the residual goes with each draw of it") {
@@ -185,7 +187,8 @@ TEST_CASE(
   CHECK(fit.gap.summary.find("as unsure as what may be wrong") != std::string::npos);
   const Eigen::VectorXd truth = HiddenParameters(robot, 3);
   const Gaussian narrow = Moments(alone.posterior), wide = Moments(fit.result.posterior);
-  CHECK(wide.mean == narrow.mean);
+  const Eigen::ArrayXd prior = PriorGaussian(robot).covariance.diagonal();
+  CHECK((wide.covariance.diagonal().array() < prior).all());
   double farthest = 0;  // of the truth, in standard deviations of the posterior alone
   for (Eigen::Index i = 0; i < truth.size(); ++i) {
     const ParameterDescription& p = robot.parameters[static_cast<size_t>(i)];
@@ -195,6 +198,9 @@ TEST_CASE(
     CHECK(wide.covariance(i, i) >= narrow.covariance(i, i));
     farthest = std::max(farthest, off / std::sqrt(narrow.covariance(i, i)));
   }
+  // What the data say is still believed, and the prior again where that may be anywhere.
+  const Eigen::VectorXd moved = wide.mean - narrow.mean;
+  CHECK(std::sqrt(moved.dot(wide.covariance.llt().solve(moved))) < 3);
   CHECK(farthest > 10);
   CHECK(std::sqrt(wide.covariance(0, 0)) < 0.05);  // a prior's is 0.3: the mass is still known
   const Eigen::VectorXd spread =

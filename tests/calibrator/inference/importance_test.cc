@@ -83,6 +83,31 @@ TEST_CASE("of a rough density no single peak is taken for the whole") {
   CHECK(std::abs(found.mean(0)) < 2);
 }
 
+// The largest variance in any direction.
+double Widest(const ImportanceFit& fit) {
+  return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(Moments(fit.mixture).covariance)
+      .eigenvalues()
+      .maxCoeff();
+}
+
+TEST_CASE("of a rough density nothing is learnt that is wider than the prior") {
+  // Peaks that are hardly wider than their distances are many, all over a prior that is N(0, 1).
+  const auto comb = [](const Eigen::MatrixXd& x) -> Eigen::VectorXd {
+    const Eigen::ArrayXXd at = x.array();
+    return -0.5 * at.square().colwise().sum().transpose() +
+           4e3 * ((37 * at.row(0)).cos() + (53 * at.row(1)).cos()).transpose();
+  };
+  const Gaussian guess{Eigen::Vector2d(1.5, -1), 0.3 * Eigen::Matrix2d::Identity()};
+  ImportanceOptions options;
+  options.samples = 100;
+  options.widest = Eigen::Matrix2d::Identity();
+  const ImportanceFit bounded = FitByImportance(comb, {{1}, {guess}}, options);
+  CHECK(bounded.power < 1);
+  CHECK(Widest(bounded) < 1 + 1e-9);
+  options.widest.resize(0, 0);
+  CHECK(Widest(FitByImportance(comb, {{1}, {guess}}, options)) > 3);
+}
+
 TEST_CASE("two modes get the weights, the places and the widths that they have") {
   const ImportanceFit fit = FitByImportance(Bimodal, Guess(0.5));
   CHECK(fit.samples.cols() == 1600);
