@@ -252,11 +252,11 @@ int MakeFigure(Process& process, const std::filesystem::path& output, uint64_t s
   Results results(output / "figure_1.csv", fmt::format("seed {}{}", seed, quick ? ", quick" : ""),
                   {"method"}, {"xi", "density", "near_light", "near_heavy", "mean", "sd"}, ranks);
   const std::vector<Job> jobs = {
-      {"squared_error", 1,
+      {"squared_error", 1, 0,
        [&](const auto&) { return Tabulate(grid, BySquaredError(transitions, seed)); }},
-      {"population", 1,
+      {"population", 1, 1,
        [&](const auto&) { return Tabulate(grid, AsPopulation(transitions, seed)); }},
-      {"mixture", 100, [&](const auto& progress) {
+      {"mixture", 100, 2, [&](const auto& progress) {
          return Tabulate(grid, ByConditionalMixture(transitions, seed, progress));
        }}};
   if (const auto status = RunJobs(process, jobs, results)) return *status;

@@ -170,7 +170,7 @@ int MakeFigure(Process& process, const Options& options) {
   for (const PaperTask& task : kPaperTasks) {
     for (int run = 1; run <= options.runs; ++run) {
       for (const Method& method : kMethods) {
-        jobs.push_back({KeyOf(task, method, run), 1, [&, run](const auto& progress) {
+        jobs.push_back({KeyOf(task, method, run), 1, run, [&, run](const auto& progress) {
                           if (remembered.of != fmt::format("{} {}", task.name, run))
                             remembered = RecordRun(options, task, run, progress);
                           return Measure(options, remembered, method, run);

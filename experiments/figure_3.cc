@@ -167,7 +167,7 @@ int MakeFigure(Process& process, const ExperimentOptions& options) {
             training.batch * (training.first_updates() * (Learns(strategy) ? 0.5 : 1.0) +
                               options.iterations * training.updates_again);
         jobs.push_back(
-            {KeyOf(task, strategy, run), weight, [&, run, strategy](const auto& progress) {
+            {KeyOf(task, strategy, run), weight, run, [&, run, strategy](const auto& progress) {
                return RunLoop(options, task, strategy, run, remembered, progress);
              }});
       }

@@ -80,9 +80,29 @@ class Progress {
   const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
+// What each rank does, one after the other: whole groups, or every n-th job where there are fewer
+// groups than ranks.
+std::vector<std::vector<size_t>> Share(const std::vector<Job>& jobs,
+                                       const std::vector<size_t>& pending, size_t ranks) {
+  std::vector<int> groups;
+  for (const size_t i : pending) {
+    if (std::ranges::find(groups, jobs[i].group) == groups.end()) groups.push_back(jobs[i].group);
+  }
+  std::vector<std::vector<size_t>> queues(ranks);
+  for (size_t k = 0; k < pending.size(); ++k) {
+    const auto group =
+        static_cast<size_t>(std::ranges::find(groups, jobs[pending[k]].group) - groups.begin());
+    queues[(groups.size() < ranks ? k : group) % ranks].push_back(pending[k]);
+  }
+  return queues;
+}
+
 }  // namespace
 
 std::optional<int> RunJobs(Process& process, const std::vector<Job>& jobs, Results& results) {
+  std::vector<std::string> keys;
+  for (const Job& job : jobs) keys.push_back(job.key);
+  results.Arrange(keys);
   std::vector<size_t> pending;
   double all = 0, done = 0;
   for (size_t i = 0; i < jobs.size(); ++i) {
@@ -96,30 +116,33 @@ std::optional<int> RunJobs(Process& process, const std::vector<Job>& jobs, Resul
   const auto name = [&](size_t i) {
     return fmt::format("{} of {}: {}", i + 1, jobs.size(), jobs[i].key);
   };
-  for (size_t first = 0; first < pending.size(); first += size) {
-    const std::span<const size_t> round =
-        std::span(pending).subspan(first, std::min(size, pending.size() - first));
+  const std::vector<std::vector<size_t>> queues = Share(jobs, pending, size);
+  for (size_t k = 0; std::ranges::any_of(queues, [&](const auto& q) { return q.size() > k; });
+       ++k) {
+    const auto has = [&](size_t r) { return k < queues[r].size(); };
     double weight = 0;
-    for (const size_t i : round) weight += jobs[i].weight;
+    for (size_t r = 0; r < size; ++r) weight += has(r) ? jobs[queues[r][k]].weight : 0;
     Part mine = Results::Rows();
-    if (rank < round.size()) {
+    if (has(rank)) {
+      const size_t job = queues[rank][k];
       const auto advance = [&](double share) {
         if (process.stopping()) throw Stopped();
-        progress.Show(name(round[rank]), share, (done + share * weight) / all);
+        progress.Show(name(job), share, (done + share * weight) / all);
       };
       try {
         advance(0);
-        mine = jobs[round[rank]].run(advance);
+        mine = jobs[job].run(advance);
       } catch (const Stopped&) {
         mine.reset();
       }
     }
     const std::vector<Part> parts = Gather(results, mine);
-    for (size_t r = 0; r < round.size(); ++r) {
-      if (!parts[r]) continue;
-      results.Add(jobs[round[r]].key, *parts[r]);
-      done += jobs[round[r]].weight;
-      progress.Done(name(round[r]), done / all);
+    for (size_t r = 0; r < size; ++r) {
+      if (!has(r) || !parts[r]) continue;
+      const size_t job = queues[r][k];
+      results.Add(jobs[job].key, *parts[r]);
+      done += jobs[job].weight;
+      progress.Done(name(job), done / all);
     }
     if (!std::ranges::all_of(parts, &Part::has_value)) {
       progress.BreakOff();

@@ -266,7 +266,7 @@ int Compare(Process& process, const Options& options) {
     for (const Method& method : Chosen(kMethods, options.methods)) {
       for (const Gap& gap : gaps) {
         const bool hopper = std::string(gap.model).starts_with("hopper");
-        jobs.push_back({KeyOf(gap, method, run), hopper ? 8.0 : 1.0,
+        jobs.push_back({KeyOf(gap, method, run), hopper ? 8.0 : 1.0, run,
                         [&, run, gap, method](const auto& progress) {
                           return RunLoop(options, gap, method, run, remembered, progress);
                         }});

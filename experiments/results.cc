@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
@@ -79,15 +80,25 @@ Results::Results(std::filesystem::path file, const std::string& settings,
   }
 }
 
+void Results::Arrange(const std::vector<std::string>& keys) {
+  for (size_t i = 0; i < keys.size(); ++i) place_[keys[i]] = i + 1;
+}
+
 void Results::Add(const std::string& key, Rows rows) {
   if (Has(key)) throw std::invalid_argument("the table has '" + key + "' already");
   index_[key] = groups_.size();
   groups_.emplace_back(key, std::move(rows));
   if (ranks_.rank() != 0) return;
+  std::vector<const std::pair<std::string, Rows>*> arranged;
+  for (const auto& group : groups_) arranged.push_back(&group);
+  std::ranges::stable_sort(arranged, {}, [&](const auto* group) {
+    const auto place = place_.find(group->first);
+    return place == place_.end() ? 0 : place->second;
+  });
   std::string text = header_ + "\n";
-  for (const auto& [name, group] : groups_) {
-    for (const std::vector<double>& row : group)
-      text += fmt::format("{},{:.8g}\n", name, fmt::join(row, ","));
+  for (const auto* group : arranged) {
+    for (const std::vector<double>& row : group->second)
+      text += fmt::format("{},{:.8g}\n", group->first, fmt::join(row, ","));
   }
   WriteAtomically(file_, text);
 }

@@ -31,6 +31,9 @@ class Results {
   /// @param key values of the key's columns, separated by commas. @throws std::out_of_range if
   /// there is none.
   const Rows& Of(const std::string& key) const { return groups_[index_.at(key)].second; }
+  /// From now on the table has the rows of these keys in this order, whichever come first, behind
+  /// those of others.
+  void Arrange(const std::vector<std::string>& keys);
   /// Called by all ranks, in the same order. @throws std::runtime_error if it cannot be written.
   void Add(const std::string& key, Rows rows);
 
@@ -45,6 +48,7 @@ class Results {
   std::string header_;
   std::vector<std::pair<std::string, Rows>> groups_;  // in the order in which they came
   std::map<std::string, size_t> index_;
+  std::map<std::string, size_t> place_;  // of keys that are arranged, from 1
 };
 
 }  // namespace plumb

@@ -258,13 +258,13 @@ int Measure(Process& process, const ExperimentOptions& options) {
         const double weight =
             Learns(strategy) ? static_cast<double>(TransitionCounts(options).size()) : 1;
         robot_jobs.push_back({KeyOf(task, strategy, run),
-                              weight * training.batch * training.updates_again,
+                              weight * training.batch * training.updates_again, run,
                               [&, strategy, run](const auto& progress) {
                                 return experiment.Robot(task, strategy, run, progress);
                               }});
         if (!Learns(strategy)) continue;
         simulator_jobs.push_back(
-            {KeyOf(task, strategy, run), 1, [&, strategy, run](const auto& progress) {
+            {KeyOf(task, strategy, run), 1, run, [&, strategy, run](const auto& progress) {
                return experiment.Simulator(task, strategy, run, progress);
              }});
       }
