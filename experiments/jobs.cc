@@ -101,6 +101,7 @@ std::vector<std::vector<size_t>> Share(const std::vector<Job>& jobs,
 
 std::optional<int> RunJobs(Process& process, const std::vector<Job>& jobs, Results& results) {
   std::vector<std::string> keys;
+  keys.reserve(jobs.size());
   for (const Job& job : jobs) keys.push_back(job.key);
   results.Arrange(keys);
   std::vector<size_t> pending;

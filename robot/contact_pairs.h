@@ -22,7 +22,10 @@ struct ContactPairs {
   struct Solid {
     int link;      ///< index into links
     size_t shape;  ///< index into its collisions
-    auto operator<=>(const Solid&) const = default;
+    bool operator==(const Solid&) const = default;
+    bool operator<(const Solid& other) const {
+      return std::pair(link, shape) < std::pair(other.link, other.shape);
+    }
   };
   std::vector<Solid> solids;                     ///< those that are in a pair, in order
   std::vector<std::pair<size_t, size_t>> pairs;  ///< of solids, the first one's link before the
