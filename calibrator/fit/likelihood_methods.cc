@@ -9,6 +9,7 @@
 #include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/inference/importance.h"
 #include "common/decompositions.h"
+#include "robot/parameter_distribution.h"
 #include "sim/tasks/task.h"
 
 namespace plumb {
@@ -33,19 +34,15 @@ WindowErrors WindowsOf(const MethodInput& input, const CurriculumFit& curriculum
   return errors;
 }
 
-// Half the distance between what is one standard deviation below and above in standard coordinates.
-Eigen::VectorXd Widths(const Prior& prior) {
-  const Eigen::VectorXd one = Eigen::VectorXd::Ones(prior.size());
-  return (prior.FromStandard(one) - prior.FromStandard(-one)) / 2;
-}
-
 // How far the log posterior drops two standard deviations away, along each axis of the Gaussian,
 // relative to what a Gaussian makes of it: (smallest, largest). Axes that are the prior's own need
 // no check.
 std::pair<double, double> AxisDrops(const LeastSquares& problem, const LaplaceFit& fit) {
   const Eigen::Index n = problem.prior.size();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(fit.standard.covariance);
-  const Eigen::VectorXd width = Widths(problem.prior);
+  const Eigen::VectorXd width = (problem.prior.FromStandard(Eigen::VectorXd::Ones(n)) -
+                                 problem.prior.FromStandard(-Eigen::VectorXd::Ones(n))) /
+                                2;
   const Eigen::MatrixXd curvature =
       width.asDiagonal() * fit.information * width.asDiagonal() + Eigen::MatrixXd::Identity(n, n);
   std::vector<Eigen::VectorXd> steps{Eigen::VectorXd::Zero(n)};
@@ -98,7 +95,7 @@ MethodResult MixtureFrom(const MethodInput& input, MethodResult laplace) {
       (input.options.budget - laplace.simulated_steps - errors.simulated_steps()) /
       std::max<int64_t>(1, errors.steps() * options.rounds);
   options.samples = static_cast<int>(std::clamp<int64_t>(affordable, 50, 2000));
-  options.widest = Widths(problem.prior).cwiseAbs2().asDiagonal();
+  options.widest = PriorGaussian(input.model->description()).covariance;
   int round = 0;
   const ImportanceFit fit = FitByImportance(
       [&](const Eigen::MatrixXd& x) {

@@ -1,36 +1,31 @@
 #include "calibrator/inference/displaced.h"
 
+#include "calibrator/inference/common_axes.h"
 #include "common/decompositions.h"
 
 namespace plumb {
 
 Gaussian Displaced(const Gaussian& prior, const Gaussian& posterior,
                    const Eigen::MatrixXd& displacements) {
-  const Eigen::Index n = prior.mean.size();
-  const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(n, n);
-  // In coordinates in which the prior is a standard normal.
-  const Eigen::LLT<Eigen::MatrixXd> width(prior.covariance);
-  const Eigen::MatrixXd half = width.matrixL().solve(posterior.covariance);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(
-      Eigen::MatrixXd(width.matrixL().solve(half.transpose())));
-  const Eigen::MatrixXd moved =
-      axes.eigenvectors().transpose() * width.matrixL().solve(displacements);
-  // Along the posterior's axes, each on its own: what the data know, and that times what they say.
-  const Eigen::ArrayXd precision = axes.eigenvalues().array().inverse();
+  const auto identity = [](Eigen::Index n) { return Eigen::MatrixXd::Identity(n, n); };
+  // Along axes in which the prior is a standard normal and the posterior's entries are independent:
+  const CommonAxes common = FindCommonAxes(prior.covariance, posterior.covariance);
+  const Eigen::ArrayXd precision = common.ratios.array().inverse();
+  const Eigen::VectorXd offset = common.inverse * (posterior.mean - prior.mean);
+  const Eigen::MatrixXd moved = common.inverse * displacements;
+  // what the data know by themselves, and where that says they are,
   const Eigen::VectorXd known = (precision - 1).max(0);
-  const Eigen::VectorXd offset =
-      axes.eigenvectors().transpose() * width.matrixL().solve(posterior.mean - prior.mean);
   const Eigen::VectorXd estimate =
       (known.array() > 0).select(precision / known.array() * offset.array(), 0.0);
-  // (known^-1 + D D')^-1, by Woodbury's identity, as known may be zero
+  // and what is left of it, (known^-1 + D D')^-1, by Woodbury's identity, as known may be zero.
   const Eigen::MatrixXd told = known.asDiagonal() * moved;
-  const Eigen::MatrixXd doubt =
-      Eigen::MatrixXd::Identity(moved.cols(), moved.cols()) + moved.transpose() * told;
-  const Eigen::MatrixXd left = Eigen::MatrixXd(known.asDiagonal()) -
-                               told * Eigen::LLT<Eigen::MatrixXd>(doubt).solve(told.transpose());
-  const Eigen::LLT<Eigen::MatrixXd> sum(Eigen::MatrixXd(left + identity));
-  const Eigen::MatrixXd back = width.matrixL() * axes.eigenvectors();
-  return {prior.mean + back * sum.solve(left * estimate), back * sum.solve(back.transpose())};
+  const Eigen::LLT<Eigen::MatrixXd> doubt(
+      Eigen::MatrixXd(identity(moved.cols()) + moved.transpose() * told));
+  const Eigen::MatrixXd left =
+      Eigen::MatrixXd(known.asDiagonal()) - told * doubt.solve(told.transpose());
+  const Eigen::LLT<Eigen::MatrixXd> sum(Eigen::MatrixXd(left + identity(left.rows())));
+  return {prior.mean + common.axes * sum.solve(left * estimate),
+          common.axes * sum.solve(common.axes.transpose())};
 }
 
 }  // namespace plumb

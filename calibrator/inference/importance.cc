@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "calibrator/inference/common_axes.h"
 #include "common/decompositions.h"
 
 namespace plumb {
@@ -17,27 +18,19 @@ constexpr double kWide = 4, kWider = 100;
 constexpr double kLeastWeight = 1e-3;
 constexpr double kDoubt = 0.5;  // about the guess's weights
 
-// The covariance, with its variances along the axes that it shares with the bound turned into what
-// `limited` makes of their ratio to the bound's.
-template <class Limited>
-Eigen::MatrixXd Against(const Eigen::MatrixXd& bound, const Eigen::MatrixXd& covariance,
-                        Limited limited) {
-  const Eigen::LLT<Eigen::MatrixXd> factor(bound);
-  const Eigen::MatrixXd half = factor.matrixL().solve(covariance);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ratios(
-      factor.matrixL().solve(half.transpose()));
-  const Eigen::MatrixXd axes = factor.matrixL() * ratios.eigenvectors();
-  return axes * limited(ratios.eigenvalues()).asDiagonal() * axes.transpose();
+// With variances, along the axes that it shares with the bound, of `least` to `most` times the
+// bound's.
+Eigen::MatrixXd Limited(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& bound,
+                        double least, double most) {
+  const CommonAxes common = FindCommonAxes(bound, covariance);
+  return common.axes * common.ratios.cwiseMax(least).cwiseMin(most).asDiagonal() *
+         common.axes.transpose();
 }
-
-Eigen::MatrixXd AtLeast(const Eigen::MatrixXd& least, const Eigen::MatrixXd& covariance) {
-  return Against(least, covariance,
-                 [](const Eigen::VectorXd& ratios) { return ratios.cwiseMax(1).eval(); });
+Eigen::MatrixXd AtLeast(const Eigen::MatrixXd& bound, const Eigen::MatrixXd& covariance) {
+  return Limited(covariance, bound, 1, std::numeric_limits<double>::infinity());
 }
-
-Eigen::MatrixXd AtMost(const Eigen::MatrixXd& most, const Eigen::MatrixXd& covariance) {
-  return Against(most, covariance,
-                 [](const Eigen::VectorXd& ratios) { return ratios.cwiseMin(1).eval(); });
+Eigen::MatrixXd AtMost(const Eigen::MatrixXd& bound, const Eigen::MatrixXd& covariance) {
+  return Limited(covariance, bound, 0, 1);
 }
 
 // Each component as it is, and wide, but no wider than `widest`, if that is given. @param doubt
