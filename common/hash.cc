@@ -1,12 +1,18 @@
 #include "common/hash.h"
 
 #include <array>
+#include <bit>
 
 namespace plumb {
+namespace {
+
+constexpr uint64_t kPrime = 0x100000001b3;
+
+}  // namespace
 
 uint64_t Hash(const void* data, size_t size, uint64_t from) {
   const auto* bytes = static_cast<const unsigned char*>(data);
-  for (size_t i = 0; i < size; ++i) from = (from ^ bytes[i]) * 0x100000001b3;
+  for (size_t i = 0; i < size; ++i) from = (from ^ bytes[i]) * kPrime;
   return from;
 }
 
@@ -14,8 +20,14 @@ uint64_t Hash(std::string_view text, uint64_t from) { return Hash(text.data(), t
 
 uint64_t Hash(const Eigen::MatrixXd& matrix, uint64_t from) {
   const std::array<int64_t, 2> shape{matrix.rows(), matrix.cols()};
-  return Hash(matrix.data(), static_cast<size_t>(matrix.size()) * sizeof(double),
-              Hash(shape.data(), sizeof shape, from));
+  from = Hash(shape.data(), sizeof shape, from);
+  for (const double entry : matrix.reshaped()) {
+    from = (from ^ std::bit_cast<uint64_t>(entry)) * kPrime;
+    // A product's low bits know nothing of the factors' high ones: two signs that change would
+    // otherwise make the same hash.
+    from ^= from >> 32;
+  }
+  return from;
 }
 
 }  // namespace plumb

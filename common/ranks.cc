@@ -7,6 +7,7 @@
 #include <exception>
 #include <numeric>
 #include <stdexcept>
+#include <utility>
 
 #ifdef PLUMB_MPI
 #define OMPI_SKIP_MPICXX 1
@@ -30,8 +31,10 @@ std::vector<int> Displacements(std::span<const int> counts) {
 
 }  // namespace
 
+Ranks::Ranks() : Ranks(Join()) {}
+
 const Ranks& Ranks::Alone() {
-  static const Ranks alone{Single{}};
+  static const Ranks alone{nullptr};
   return alone;
 }
 
@@ -88,17 +91,38 @@ void Ranks::TreeSum(int terms, std::span<const PartialSum> mine, std::span<float
 
 #ifdef PLUMB_MPI
 
-Ranks::Ranks() {
-  if (!StartedByMpirun()) return;  // MPI_Init alone takes a second
+struct Ranks::Communicator {
+  MPI_Comm group = MPI_COMM_WORLD;
+};
+
+std::unique_ptr<Ranks::Communicator> Ranks::Join() {
+  if (!StartedByMpirun()) return nullptr;  // MPI_Init alone takes a second
   int threads;
   MPI_Init_thread(nullptr, nullptr, MPI_THREAD_FUNNELED, &threads);
-  joined_ = true;
-  MPI_Comm_rank(MPI_COMM_WORLD, &rank_);
-  MPI_Comm_size(MPI_COMM_WORLD, &size_);
+  return std::make_unique<Communicator>();
+}
+
+Ranks::Ranks(std::unique_ptr<Communicator> communicator) : communicator_(std::move(communicator)) {
+  if (!communicator_) return;
+  MPI_Comm_rank(communicator_->group, &rank_);
+  MPI_Comm_size(communicator_->group, &size_);
 }
 
 Ranks::~Ranks() {
-  if (joined_ && std::uncaught_exceptions() == 0) MPI_Finalize();
+  if (!communicator_ || std::uncaught_exceptions() > 0) return;
+  if (communicator_->group == MPI_COMM_WORLD) {
+    MPI_Finalize();
+  } else {
+    MPI_Comm_free(&communicator_->group);
+  }
+}
+
+Ranks Ranks::OnThisMachine() const {
+  if (!communicator_) return Ranks(nullptr);
+  auto neighbours = std::make_unique<Communicator>();
+  MPI_Comm_split_type(communicator_->group, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL,
+                      &neighbours->group);
+  return Ranks(std::move(neighbours));
 }
 
 void Ranks::Broadcast(std::span<std::byte> bytes) const {
@@ -106,7 +130,7 @@ void Ranks::Broadcast(std::span<std::byte> bytes) const {
   constexpr size_t kMax = 1 << 30;  // MPI counts in int
   for (size_t first = 0; first < bytes.size(); first += kMax) {
     const size_t count = std::min(kMax, bytes.size() - first);
-    MPI_Bcast(bytes.data() + first, static_cast<int>(count), MPI_BYTE, 0, MPI_COMM_WORLD);
+    MPI_Bcast(bytes.data() + first, static_cast<int>(count), MPI_BYTE, 0, communicator_->group);
   }
 }
 
@@ -118,7 +142,7 @@ void Ranks::AllGather(void* items, size_t item_size, std::span<const int> bounds
   MPI_Type_contiguous(static_cast<int>(item_size), MPI_BYTE, &item);
   MPI_Type_commit(&item);
   MPI_Allgatherv(MPI_IN_PLACE, 0, MPI_DATATYPE_NULL, items, counts.data(), bounds.data(), item,
-                 MPI_COMM_WORLD);
+                 communicator_->group);
   MPI_Type_free(&item);
 }
 
@@ -126,20 +150,25 @@ void Ranks::Exchange(const float* send, std::span<const int> send_counts, float*
                      std::span<const int> receive_counts) const {
   MPI_Alltoallv(send, send_counts.data(), Displacements(send_counts).data(), MPI_FLOAT, receive,
                 receive_counts.data(), Displacements(receive_counts).data(), MPI_FLOAT,
-                MPI_COMM_WORLD);
+                communicator_->group);
 }
 
 #else
 
-Ranks::Ranks() {
+struct Ranks::Communicator {};
+
+std::unique_ptr<Ranks::Communicator> Ranks::Join() {
   if (StartedByMpirun()) {
     throw std::runtime_error(
         "mpirun has started this, but it was built without OpenMPI: install libopenmpi-dev and "
         "build again");
   }
+  return nullptr;
 }
 
+Ranks::Ranks(std::unique_ptr<Communicator>) {}
 Ranks::~Ranks() = default;
+Ranks Ranks::OnThisMachine() const { return Ranks(nullptr); }
 void Ranks::Broadcast(std::span<std::byte>) const {}
 void Ranks::AllGather(void*, size_t, std::span<const int>) const {}
 void Ranks::Exchange(const float*, std::span<const int>, float*, std::span<const int>) const {}

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -31,6 +32,10 @@ class Ranks {
 
   int rank() const { return rank_; }
   int size() const { return size_; }
+
+  /// Those that run on the same machine as this one, as ranks of their own: what they exchange
+  /// takes microseconds. Called by all ranks. Must not outlive this.
+  Ranks OnThisMachine() const;
 
   /// Shares `count` things out, evenly but for one: rank r has [Bounds[r], Bounds[r + 1]).
   std::vector<int> Bounds(int count) const;
@@ -64,13 +69,14 @@ class Ranks {
   void TreeSum(int terms, std::span<const PartialSum> mine, std::span<float> sum) const;
 
  private:
-  struct Single {};
-  explicit Ranks(Single) {}
+  struct Communicator;  // MPI's name of the group
+  explicit Ranks(std::unique_ptr<Communicator> communicator);
+  static std::unique_ptr<Communicator> Join();
   void Exchange(const float* send, std::span<const int> send_counts, float* receive,
                 std::span<const int> receive_counts) const;
 
+  std::unique_ptr<Communicator> communicator_;  // null: the only rank
   int rank_ = 0, size_ = 1;
-  bool joined_ = false;
 };
 
 }  // namespace plumb

@@ -18,9 +18,17 @@ std::vector<int> Sizes(const TrainingSettings& settings, int observations) {
   return sizes;
 }
 
-// A minibatch is shared by so many tasks, whatever the number of threads: sums over them are taken
-// in order. More would be too small to be worth handing to another thread.
+// A minibatch is shared by so many tasks, whatever the number of threads and ranks: sums over them
+// are taken in order. More would be too small to be worth handing to another thread.
 constexpr int kShares = 2;
+
+// Which neighbour has which shares of a minibatch; one, if all of them do all of it. Threads share
+// it among themselves, and two of them improve policy and critic side by side: MPI is for one.
+std::vector<int> ShareBounds(const Ranks& neighbours, int threads) {
+  const std::vector<int> all = neighbours.Collect(threads);
+  const bool alone = std::any_of(all.begin(), all.end(), [](int n) { return n > 1; });
+  return (alone ? Ranks::Alone() : neighbours).Bounds(kShares);
+}
 
 }  // namespace
 
@@ -29,18 +37,17 @@ Critic::Critic(const TrainingSettings& settings, int observations, Random random
     : settings_(settings),
       observations_(observations),
       workers_(&workers),
-      network_(Sizes(settings, observations), workers, ranks) {
+      network_(Sizes(settings, observations), workers, ranks),
+      neighbours_(ranks.OnThisMachine()),
+      bounds_(ShareBounds(neighbours_, workers.size())) {
   state_.parameters = OrthogonalParameters(Sizes(settings, observations), 1, random);
   state_.first_moment.setZero(state_.parameters.size());
   state_.second_moment.setZero(state_.parameters.size());
   const std::vector<int> sizes = Sizes(settings, observations);
   for (int i = 0; i < kShares; ++i) {
-    shares_.push_back({kernels::Tape(sizes, settings.critic_minibatch / kShares + 1),
-                       {},
-                       {},
-                       {},
-                       Eigen::VectorXf(state_.parameters.size())});
+    shares_.push_back({kernels::Tape(sizes, settings.critic_minibatch / kShares + 1), {}, {}, {}});
   }
+  gradients_.resize(state_.parameters.size(), kShares);
   for (int i = 0; i < workers.size(); ++i) copies_.push_back({kernels::Network(sizes)});
 }
 
@@ -78,11 +85,16 @@ void Critic::Rescale(std::span<const double> targets) {
   state_.parameters.tail(1).array() += static_cast<float>((old_mean - mean) / sd);
 }
 
-// One step of Adam. Both halves, gradient and step, are shared by the threads.
+// One step of Adam. Both halves, gradient and step, are shared by the threads; ranks share the
+// gradient.
 void Critic::Descend(std::span<const float> observations, std::span<const float> targets,
                      std::span<const int> samples, float l2) {
   const int size = static_cast<int>(samples.size());
-  workers_->Run(kShares, [&](int task, int worker) {
+  const bool shared = bounds_.size() > 2;
+  const auto self = static_cast<size_t>(shared ? neighbours_.rank() : 0);
+  const int first_share = bounds_[self], own_shares = bounds_[self + 1] - first_share;
+  workers_->Run(own_shares, [&](int own_share, int worker) {
+    const int task = first_share + own_share;
     Copy& copy = copies_[static_cast<size_t>(worker)];
     if (copy.adam_steps != state_.adam_steps) {
       copy.network.Set({state_.parameters.data(), static_cast<size_t>(state_.parameters.size())});
@@ -104,15 +116,18 @@ void Critic::Descend(std::span<const float> observations, std::span<const float>
       const float error = share.outputs[i] - targets[static_cast<size_t>(own[i])];
       share.output_gradient[i] = 2 * error / static_cast<float>(size);
     }
-    share.tape.Backward(copy.network, share.output_gradient.data(), share.gradient.data());
+    share.tape.Backward(copy.network, share.output_gradient.data(), gradients_.col(task).data());
   });
-  ++state_.adam_steps;
   const auto parameters = static_cast<int>(state_.parameters.size());
+  if (shared)
+    neighbours_.AllGather(gradients_.data(), static_cast<size_t>(parameters) * sizeof(float),
+                          bounds_);
+  ++state_.adam_steps;
   workers_->Run(kShares, [&](int task, int) {
     const int first = parameters * task / kShares,
               count = parameters * (task + 1) / kShares - first;
     kernels::AdamStep(count, state_.adam_steps, static_cast<float>(settings_.critic_rate), l2,
-                      {shares_[0].gradient.data() + first, shares_[1].gradient.data() + first},
+                      {gradients_.col(0).data() + first, gradients_.col(1).data() + first},
                       state_.parameters.data() + first, state_.first_moment.data() + first,
                       state_.second_moment.data() + first);
   });

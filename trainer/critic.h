@@ -23,11 +23,13 @@ struct CriticState {
 /// The value function: a tanh network fitted to value targets by Adam. With normalise_values the
 /// network predicts targets normalised by their running mean and standard deviation; when these
 /// move, its output layer is rescaled so that the predicted values stay (van Hasselt et al., 2016,
-/// "Pop-Art"). Not thread-safe.
+/// "Pop-Art"). Minibatches are shared by threads or, where every rank has but one, by the ranks of
+/// a machine; over a network it would take as long to exchange a gradient as to make it. Not
+/// thread-safe.
 class Critic {
  public:
   /// @param observations length of an input. @param random for the initial weights. @param
-  /// workers,ranks must outlive it.
+  /// workers,ranks must outlive it. All ranks make the same critic and call the same methods.
   Critic(const TrainingSettings& settings, int observations, Random random, Workers& workers,
          const Ranks& ranks = Ranks::Alone());
 
@@ -49,7 +51,6 @@ class Critic {
   struct Share {
     kernels::Tape tape;
     std::vector<float> inputs, outputs, output_gradient;
-    Eigen::VectorXf gradient;
   };
   /// The network as one thread has it.
   struct Copy {
@@ -67,7 +68,10 @@ class Critic {
   BatchNetwork network_;
   CriticState state_;
   std::vector<Share> shares_;
-  std::vector<Copy> copies_;  // one per worker
+  Eigen::MatrixXf gradients_;  // parameters x shares
+  std::vector<Copy> copies_;   // one per worker
+  Ranks neighbours_;           // on this machine
+  std::vector<int> bounds_;    // neighbour r has the shares from [r] to [r + 1]
 };
 
 /// 1 - var(target - value) / var(target); 0 if the targets do not vary.

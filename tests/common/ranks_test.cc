@@ -50,6 +50,7 @@ TEST_CASE("a rank alone has all of it") {
   const std::byte bytes[] = {std::byte{3}, std::byte{4}};
   CHECK(ranks.Concatenate(bytes) == std::vector<std::byte>(bytes, bytes + 2));
   CHECK(ranks.Collect(7.5) == std::vector<double>{7.5});
+  CHECK(ranks.OnThisMachine().size() == 1);
   const auto terms = RandomTerms(2, 3);
   CHECK(Sum(ranks, 2, 3)[1] == terms[0][1] + terms[1][1]);
 }
@@ -90,6 +91,13 @@ TEST_CASE("ranks exchange what they should", "[.exchange]") {
 
   const std::vector<int> all = ranks.Collect(rank * rank);
   for (int r = 0; r < size; ++r) CHECK(all[static_cast<size_t>(r)] == r * r);
+
+  {
+    const Ranks neighbours = ranks.OnThisMachine();
+    CHECK(neighbours.size() == size);
+    CHECK(neighbours.Collect(rank) == ranks.Collect(rank));
+  }
+  CHECK(ranks.Collect(rank).back() == size - 1);  // nobody has left
 }
 
 TEST_CASE("any number of ranks") {
