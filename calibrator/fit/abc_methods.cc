@@ -12,6 +12,7 @@
 #include "calibrator/inference/abc_smc.h"
 #include "calibrator/inference/conditional_mixture.h"
 #include "calibrator/inference/importance.h"
+#include "common/hash.h"
 
 namespace plumb {
 namespace {
@@ -34,7 +35,10 @@ MethodResult ByApproximation(const MethodInput& input, const std::string& name,
   MethodResult result =
       FromCurriculum(input, FitCurriculum(input.model, input.rollouts, options, input.start));
   const int every = EveryFor(input, kFewestSimulators);
-  WindowErrors errors(input.model, input.rollouts, 1, input.options.execution, every);
+  // Ranks share simulators with all that becomes of their errors, and exchange a few numbers of
+  // each in place of all errors: these are for whoever has made them.
+  const ExecutionOptions& execution = input.options.execution;
+  WindowErrors errors(input.model, input.rollouts, 1, execution.threads, every);
   errors.set_noise_sd(result.noise_sd);
   errors.Linearise(robot.ToPhysical(result.curriculum->fit.mode));
   LaplaceOptions curvature_only;
@@ -44,13 +48,19 @@ MethodResult ByApproximation(const MethodInput& input, const std::string& name,
   Problem problem =
       RobotProblem(robot, errors, view, input.options.discrepancy, input.options.seed);
   // the first fit counts, too
-  const int64_t left = input.options.budget - result.simulated_steps - errors.simulated_steps();
+  result.simulated_steps += errors.simulated_steps();
+  const int64_t left = input.options.budget - result.simulated_steps;
   const int64_t simulations = std::max<int64_t>(1, left / errors.steps());
   const Simulate simulate = problem.simulate;
+  BatchRunner here;
   problem.simulate = [&](const Eigen::MatrixXd& parameters, int64_t first) {
     input.options.progress(
         name, std::min(1.0, static_cast<double>(first) / static_cast<double>(simulations)));
-    return simulate(parameters, first);
+    return (execution.batches ? *execution.batches : here)
+        .Run(Hash(parameters, Hash(name)), problem.observed.size(), parameters.cols(),
+             [&](Eigen::Index begin, Eigen::Index count) {
+               return simulate(parameters.middleCols(begin, count), first + begin);
+             });
   };
   const auto [posterior, how] = infer(problem, simulations);
   result.curriculum.reset();  // the first fit is not the answer
@@ -65,7 +75,7 @@ MethodResult ByApproximation(const MethodInput& input, const std::string& name,
                                            1.0 / static_cast<double>(posterior.samples.cols())),
                  kPosteriorSamples, random);
   }
-  result.simulated_steps += errors.simulated_steps();
+  result.simulated_steps += posterior.simulations * errors.steps();
   result.failures += posterior.failures;
   result.check =
       fmt::format("approximate Bayesian computation with {} simulators, discrepancy {}; {}",
