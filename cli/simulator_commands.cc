@@ -1,3 +1,6 @@
+#include <cmath>
+#include <string>
+
 #include "cli/calibrate.h"
 #include "cli/command.h"
 #include "cli/excite.h"
@@ -77,10 +80,12 @@ void AddCalibrate(CLI::App& app, const std::string& line, Action& action) {
       ->delimiter(',')
       ->capture_default_str();
   calibrate
-      ->add_option("--budget", flags->options.budget,
-                   "transitions that sampling methods may simulate")
+      ->add_option_function<double>(
+          "--budget",
+          [flags](double transitions) { flags->options.budget = std::llround(transitions); },
+          "transitions that sampling methods may simulate, e.g. 1e6")
       ->check(CLI::Range(100.0, 1e12))
-      ->capture_default_str();
+      ->default_str(std::to_string(flags->options.budget));
   calibrate
       ->add_option("--discrepancy", flags->options.discrepancy,
                    "of methods that know only simulations")

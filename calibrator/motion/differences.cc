@@ -74,9 +74,11 @@ std::vector<std::string> DifferencedJoints(const RobotDescription& robot,
 std::string DifferencesWarning(std::span<const std::string> joints) {
   std::string names;
   for (const std::string& joint : joints) names += (names.empty() ? "v/" : ", v/") + joint;
-  return names + (joints.size() == 1 ? " is" : " are") +
-         " made of differences of the positions, and tell nothing that these do not: auto, laplace "
-         "and mixture do without; intervals of other methods will be too narrow";
+  const bool one = joints.size() == 1;
+  return names + (one ? " is" : " are") + " made of differences of the positions, and " +
+         (one ? "tells" : "tell") +
+         " nothing that these do not: auto, laplace and mixture do without; intervals of other "
+         "methods will be too narrow";
 }
 
 std::vector<std::string> UnreadJoints(const RobotDescription& robot,

@@ -12,12 +12,12 @@
 #include "calibrator/fit/likelihood_methods.h"
 #include "calibrator/fit/methods.h"
 #include "calibrator/fit/physical_columns.h"
-#include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/gap/gap.h"
 #include "calibrator/inference/chi_squared.h"
 #include "calibrator/motion/differences.h"
 #include "common/decompositions.h"
 #include "common/time_units.h"
+#include "robot/parameter_distribution.h"
 
 namespace plumb {
 namespace {
@@ -33,11 +33,7 @@ class Calibration {
  public:
   Calibration(const RobotDescription& robot, std::span<const Log> logs,
               const CalibrationOptions& options)
-      : robot_(robot),
-        model_(std::make_shared<Model>(robot)),
-        logs_(logs),
-        options_(options),
-        prior_(PriorOf(robot)) {
+      : robot_(robot), model_(std::make_shared<Model>(robot)), logs_(logs), options_(options) {
     for (const Log& log : logs) own_.push_back(Motion(log));
     for (const std::vector<Rollout>& own : own_)
       rollouts_.insert(rollouts_.end(), own.begin(), own.end());
@@ -52,8 +48,7 @@ class Calibration {
     findings_.method = options_.method;
     findings_.used = result.used;
     findings_.seed = options_.seed;
-    findings_.prior = {prior_.FromStandard(Eigen::VectorXd::Zero(prior_.size())),
-                       PriorCovariance()};
+    findings_.prior = PriorGaussian(robot_);
     findings_.posterior = result.posterior;
     findings_.samples = PhysicalColumns(robot_, result.samples);
     findings_.transitions = static_cast<int64_t>(CountTransitions(rollouts_));
@@ -82,13 +77,6 @@ class Calibration {
     if (KnowsLikelihood(options_.method))
       ForgetVelocities(robot_, UnreadJoints(robot_, log.differenced), &rollouts);
     return rollouts;
-  }
-
-  Eigen::MatrixXd PriorCovariance() const {
-    Eigen::VectorXd variance(prior_.size());
-    for (Eigen::Index i = 0; i < variance.size(); ++i)
-      variance(i) = std::pow(prior_.marginals()[static_cast<size_t>(i)].b, 2);
-    return variance.asDiagonal();
   }
 
   // With what the model lacks, if errors tell.
@@ -232,7 +220,7 @@ class Calibration {
   // normal vector with the sum of both covariances, in the directions that both determine.
   LogAgreement Against(const std::string& name, const std::vector<LaplaceFit>& fits,
                        size_t i) const {
-    const Eigen::Index n = prior_.size();
+    const Eigen::Index n = findings_.prior.mean.size();
     const LaplaceFit& own = fits[i];
     Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n, n);
     Eigen::VectorXd weighted = Eigen::VectorXd::Zero(n);
@@ -315,7 +303,6 @@ class Calibration {
   std::span<const Log> logs_;
   std::vector<std::vector<Rollout>> own_;  // of each log, as the method takes it
   const CalibrationOptions& options_;
-  Prior prior_;
   std::vector<Rollout> rollouts_;
   Eigen::VectorXd mean_;
   Findings findings_;
