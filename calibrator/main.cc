@@ -217,9 +217,8 @@ int main(int argc, char** argv) {
         app.add_option("robot", flags.robot, "robot folder or TOML file")->required();
         app.add_option("--log", flags.log,
                        "calibrate from this LCM log instead of live messages, and exit");
-        app.add_option(
-            "--method", flags.method,
-            "auto, laplace, mixture, reps or simopt; without it the one that robot.toml says");
+        app.add_option("--method", flags.method, "of inference; default: as robot.toml says")
+            ->check(CLI::IsMember(plumb::LiveMethods()));
         app.add_option("--seed", flags.seed, "of the random numbers")
             ->check(plumb::SeedRange())
             ->capture_default_str();

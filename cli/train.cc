@@ -45,10 +45,9 @@ RobotDescription ReadRobot(const TrainFlags& flags) {
 }
 
 ParameterDistribution ReadDistribution(const std::string& name, const RobotDescription& robot) {
-  if (name != "prior" && name != "nominal") return ReadSimulators(name, robot);
-  ParameterDistribution distribution = ParameterDistribution::Prior(robot);
-  if (name == "nominal") distribution.mixture.components[0].covariance.setZero();
-  return distribution;
+  if (name == "prior") return ParameterDistribution::Prior(robot);
+  if (name == "nominal") return ParameterDistribution::Nominal(robot);
+  return ReadSimulators(name, robot);
 }
 
 /// A fingerprint of all that the result depends on, but for the number of steps: a longer run may

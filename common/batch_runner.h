@@ -23,7 +23,7 @@ class BatchRunner {
                               const Columns& compute);
 };
 
-/// BatchRunner that have been computed, in a file: an inference that was killed at any time, begun
+/// Batches that have been computed, in a file: an inference that was killed at any time, begun
 /// anew, goes through the same batches to the same bits, and needs not compute those again. What
 /// follows the first batch that is not the expected one, or is cut off, or damaged, is forgotten.
 /// Not thread-safe.
@@ -38,7 +38,7 @@ class Journal {
   bool Read(uint64_t identity, Eigen::MatrixXd* batch);
   /// @throws std::runtime_error naming the file if it cannot be written.
   void Append(uint64_t identity, const Eigen::MatrixXd& batch);
-  /// BatchRunner that had been computed before.
+  /// Batches that had been computed before.
   int64_t resumed() const { return resumed_; }
   /// The inference is complete: removes the file.
   void Finish();

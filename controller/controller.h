@@ -103,7 +103,8 @@ class Controller {
   std::optional<place_robot_t> place_;
   int64_t placing_since_ = 0;
   bool let_go_ = false;  // the efforts are zero by now
-  int64_t attempt_ = 0;  // keys the initial state: a repeated episode begins differently
+  // keys the initial state and the exploration: a repeated episode is another one
+  int64_t attempt_ = 0;
 
   int64_t episode_ = -1;
   int64_t first_state_sequence_ = 0;

@@ -39,8 +39,8 @@ class GaussianPolicy {
   /// together or are absurd, numbers that are not finite, scales that are not positive, unknown
   /// purpose, negative counts.
   static GaussianPolicy FromMessage(const policy_t& message);
-  /// The message, except for utime, iteration, purpose and episodes (0), which are the sender's to
-  /// fill in.
+  /// The message, except for utime, iteration, trained_in, purpose, trial_steps and episodes (0),
+  /// which are the sender's to fill in.
   policy_t ToMessage() const;
 
   const PolicyShape& shape() const { return shape_; }

@@ -29,7 +29,7 @@ constexpr int64_t kReopenPeriod = 100'000;  // [us]
 constexpr double kDisarmTimeout = 0.3;
 // of frames per wake: a flood must not keep us from our deadlines
 constexpr int kBursts = 8;
-constexpr int64_t kFlight = 2'000'000;  // [us] before a fault whose frames are kept
+constexpr int64_t kFlight = kFlightSeconds * 1'000'000;  // [us]
 
 void WriteState(int8_t state, std::string_view reason) {
   constexpr std::array kNames = {"ABSENT", "IDLE", "ARMING", "ARMED", "FAULT"};
@@ -290,8 +290,10 @@ int main(int argc, char** argv) {
                        "socketcan:can0, udp:239.74.163.2:43113, of several NAME=URL; default: as "
                        "the robot says")
             ->allow_extra_args(false);
-        app.add_option("--flight-recorder", flight_recorder,
-                       "folder: on every fault the frames of the last 2 s are written there");
+        app.add_option(
+            "--flight-recorder", flight_recorder,
+            fmt::format("folder: on every fault the frames of the last {} s are written there",
+                        plumb::kFlightSeconds));
         app.add_flag("--virtual", is_virtual,
                      "the robot is plumb-robot: while no effort is sent, its positions may jump");
         app.add_flag("--unsigned", allow_unsigned, "obey anybody, although LCM leaves this machine")

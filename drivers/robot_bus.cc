@@ -12,11 +12,11 @@ namespace plumb {
 namespace {
 
 // of a bus: more than two of 1 Mbit/s carry in that time
-constexpr size_t kFlightFrames = 40'000;
+constexpr size_t kFlightFrames = kFlightSeconds * 20'000;
 
 void ReportFlight(const std::string& file, const std::string& error) {
   if (error.empty())
-    spdlog::warn("the frames of the last 2 s are in {}", file);
+    spdlog::warn("the frames of the last {} s are in {}", kFlightSeconds, file);
   else
     spdlog::error("the frames before the fault are lost: {}", error);
 }

@@ -14,6 +14,9 @@
 
 namespace plumb {
 
+/// [s] before a fault whose frames are kept.
+inline constexpr int kFlightSeconds = 2;
+
 /// One of the robot's buses: its end here, and its latest frames.
 struct RobotBus {
   RobotBus(const BusDescription& bus, std::unique_ptr<Transport> end, const std::string& folder);

@@ -84,7 +84,7 @@ int main(int argc, char** argv) {
           subscriber.Rethrow();
           imus.Rethrow();
         }
-        spdlog::info("{} measurements, {} refused, {} undecodable, {} restarts",
+        spdlog::info("{} measurements, {} unused, {} undecodable, {} restarts",
                      subscriber.received(), observer.unused(), subscriber.rejected(),
                      observer.restarts());
         if (model_observer)

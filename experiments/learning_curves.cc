@@ -199,8 +199,9 @@ std::string Each(const Curves& curves, const std::string& format, F&& value) {
 int RunSeeds(Process& process, const Options& options) {
   RobotDescription robot = LoadRobot(options.robot);
   if (options.paper) robot.training = PaperSettings(robot.training);
-  ParameterDistribution distribution = ParameterDistribution::Prior(robot);
-  if (options.distribution == "nominal") distribution.mixture.components[0].covariance.setZero();
+  const ParameterDistribution distribution = options.distribution == "nominal"
+                                                 ? ParameterDistribution::Nominal(robot)
+                                                 : ParameterDistribution::Prior(robot);
   const auto steps = options.steps > 0
                          ? static_cast<int64_t>(options.steps)
                          : int64_t{robot.training.first_updates()} * robot.training.batch;

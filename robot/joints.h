@@ -20,7 +20,7 @@ namespace plumb {
 struct MotorDescription {
   std::string protocol;  ///< file name in drivers/protocols/, e.g. "cansimple"
   int node = 0;          ///< CAN node id of the protocol, on its bus no other motor's
-  /// motor turns per joint turn (or per metre / 2 pi for a prismatic joint), > 0
+  /// [rad/rad], of a prismatic joint [rad/m]: motor angle per displacement of the joint, > 0
   double gear = 1;
   int sign = 1;                            ///< +1 or -1
   double offset = 0;                       ///< [rad] or [m] joint position at motor position 0

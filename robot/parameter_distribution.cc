@@ -73,6 +73,17 @@ ParameterDistribution ParameterDistribution::Prior(const RobotDescription& descr
   return {0, description.parameters, {{1}, {PriorGaussian(description)}}};
 }
 
+ParameterDistribution ParameterDistribution::Nominal(const RobotDescription& description) {
+  ParameterDistribution distribution = Prior(description);
+  Gaussian& only = distribution.mixture.components[0];
+  for (Eigen::Index i = 0; i < only.mean.size(); ++i) {
+    const ParameterDescription& parameter = description.parameters[static_cast<size_t>(i)];
+    only.mean[i] = parameter.ToCoordinate(parameter.mean);
+  }
+  only.covariance.setZero();
+  return distribution;
+}
+
 Eigen::VectorXd ParameterDistribution::SampleCoordinates(Random& random) const {
   const Gaussian& component = mixture.components[SampleComponent(mixture, random)];
   if (size() == 0) return component.mean;

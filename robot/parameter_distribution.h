@@ -51,12 +51,14 @@ struct ParameterDistribution {
   /// that all of these simulators lack; null = nothing
   std::shared_ptr<const Residual> residual = nullptr;
 
-  /// States (q, v), num_positions + num_velocities entries, in which episodes have begun on the
-  /// robot.
+  /// States (q, v) of the robot, num_positions + num_velocities entries, that simulated episodes
+  /// may begin with: those in which roll-outs have begun, and some of their motion.
   std::vector<Eigen::VectorXd> starts = {};
 
   /// The description's prior: one component with a diagonal covariance.
   static ParameterDistribution Prior(const RobotDescription& description);
+  /// The one simulator of the prior's means (physical units).
+  static ParameterDistribution Nominal(const RobotDescription& description);
 
   /// A message's distribution. @throws std::invalid_argument saying what is wrong: names or
   /// coordinates that are not the description's, counts that do not fit, numbers that are not
@@ -74,8 +76,8 @@ struct ParameterDistribution {
   /// recorded: a policy that exploits it elsewhere must not be a good one.
   SimulatorDraw Draw(Random& random) const;
   static constexpr double kPlainShare = 0.2;
-  /// Half of the episodes begin as they did on the robot, if that is known: however it is placed
-  /// there, it has moved before the first command arrives.
+  /// Half of the episodes begin in one of the starts, if there are any: however the robot is
+  /// placed, it has moved before the first command arrives.
   static constexpr double kRecordedStarts = 0.5;
   /// Draws parameters of the mixture. @return P values in physical units.
   Eigen::VectorXd Sample(Random& random) const;

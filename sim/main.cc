@@ -74,7 +74,8 @@ constexpr int64_t kReopenPeriod = 200'000;  // [us]
 
 /// The robot's end of one of its buses.
 struct Bus {
-  /// Tries to bring it back while it is down, and says when that changes.
+  /// Tries to bring it back while it is down, and says when that changes. @param now of the clock
+  /// that nobody sets.
   void Watch(int64_t now) {
     if (transport->link() != LinkState::kUp && now >= next_reopen) {
       transport->Reopen();
@@ -169,7 +170,7 @@ int Serve(Process& process, const RobotDescription& description, const Eigen::Ve
     }
     robot.Advance(now, answers);
     send();
-    for (Bus& bus : buses) bus.Watch(now);
+    for (Bus& bus : buses) bus.Watch(clock.Now());
     now = clock.Utime();
   }
   return 0;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <map>
 #include <stdexcept>
@@ -22,6 +23,13 @@ constexpr int kHeldOut = 50;             // simulators
 constexpr int kTried = 20;               // of a distribution, before it is trained with
 constexpr int kTrialAndExploration = 2;  // episodes of a roll-out that begins with a trial
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+std::vector<uint8_t> Encoded(const ParameterDistribution& distribution) {
+  const parameter_distribution_t message = distribution.ToMessage();
+  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
+  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  return bytes;
+}
 
 // What a status tells of an update.
 UpdateReport ReportOf(const training_status_t& status) {
@@ -153,7 +161,7 @@ bool TrainingSession::Begin(const ParameterDistribution& distribution) {
 bool TrainingSession::Replace(const ParameterDistribution& distribution) {
   if (!training() || distribution.iteration != iteration_) return false;
   if (distribution.residual) RequireResidualOf(description_, *distribution.residual);
-  if (distribution.mixture == distribution_.mixture) return false;
+  if (Encoded(distribution) == Encoded(distribution_)) return false;
   RequireSimulable(distribution);
   distribution_ = distribution;
   trainer_.ForgetBest();

@@ -61,8 +61,8 @@ Eigen::VectorXd CorrectedPredictionErrors(const std::shared_ptr<const Model>& mo
       const size_t end = std::min(transitions.size(), start + longest);
       for (size_t i = start; i < end && (i == start || follows(i)); ++i) {
         const Transition& t = transitions[i];
-        const Eigen::VectorXd effort = MeanEffort(t),
-                              before = follows(i) ? MeanEffort(transitions[i - 1]) : effort;
+        const Eigen::VectorXd effort = t.mean_effort(),
+                              before = follows(i) ? transitions[i - 1].mean_effort() : effort;
         correction.BeginStep(simulator);
         simulator.Step(t.efforts);
         correction.EndStep(simulator, effort, before, t.duration());

@@ -242,9 +242,7 @@ namespace {
 Eigen::RowVectorXd Features(const ProjectedErrors::Step& step) {
   const Transition& t = *step.transition;
   const Eigen::VectorXd &q = step.q, &v = step.v;
-  Eigen::VectorXd effort = Eigen::VectorXd::Zero(v.size());
-  for (const EffortSegment& segment : t.efforts) effort += segment.duration * segment.effort;
-  effort /= t.duration();
+  const Eigen::VectorXd effort = t.mean_effort();
   Eigen::RowVectorXd features(1 + 4 * v.size() + 3 * q.size());
   features << 1, effort.transpose(), v.transpose(),
       (v.array().abs() * v.array()).matrix().transpose(), v.array().sign().matrix().transpose(),

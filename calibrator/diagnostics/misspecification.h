@@ -51,7 +51,8 @@ struct Whereabouts {
 struct FitResiduals {
   std::span<const Rollout> rollouts;        ///< that were fitted
   std::span<const WindowErrors::Row> rows;  ///< the coordinate and transition of each error
-  /// one-step, whitened, at the posterior's mean: for the right model N(0, 1)
+  /// one-step, whitened and divided by their estimated scale, at the posterior's mean: for the
+  /// right model N(0, 1)
   Eigen::VectorXd errors;
   /// rows x d: of the errors with respect to what was fitted, in any units
   Eigen::MatrixXd jacobian;

@@ -34,16 +34,16 @@ class Discrepancy {
   Eigen::VectorXd StepError(const Eigen::MatrixXd& parameters, std::span<const Rollout> rollouts);
 
   /// ln p(s' | s, a, parameters) summed over all transitions, up to a constant. Student's t
-  /// distribution with kDegreesOfFreedom in d = 2 * joints dimensions (Lange, Little, Taylor, JASA
-  /// 84, 1989):
+  /// distribution with kDegreesOfFreedom in d = 2 * num_velocities dimensions (Lange, Little,
+  /// Taylor, JASA 84, 1989):
   ///   -(nu + d) / 2 sum ln(1 + |W e|^2 / nu)
   /// which is a Gaussian's for errors of the expected size, and hardly minds the few that a late
   /// frame or a knock at the robot made a hundred times as large.
   Eigen::VectorXd LogLikelihood(const Eigen::MatrixXd& parameters,
                                 std::span<const Rollout> rollouts);
 
-  /// All whitened errors, 2 * joints rows per transition, the speed's before the position's: for
-  /// Jacobians.
+  /// All whitened errors, 2 * num_velocities rows per transition, the speed's before the
+  /// position's: for Jacobians.
   Eigen::MatrixXd Residuals(const Eigen::MatrixXd& parameters, std::span<const Rollout> rollouts);
 
   /// Trajectory-based (Chebotar et al., "Closing the sim-to-real loop", ICRA 2019, eq. 5): simulate

@@ -28,12 +28,6 @@ void Add(const ConfigurationSpace& space, const ResidualInputs& inputs, const Tr
 
 }  // namespace
 
-Eigen::VectorXd MeanEffort(const Transition& transition) {
-  Eigen::VectorXd sum = Eigen::VectorXd::Zero(transition.efforts.front().effort.size());
-  for (const EffortSegment& segment : transition.efforts) sum += segment.duration * segment.effort;
-  return sum / transition.duration();
-}
-
 SortedErrors CollectErrors(const std::shared_ptr<const Model>& model,
                            const Eigen::VectorXd& physical, std::span<const Rollout> rollouts,
                            double margin) {
@@ -51,7 +45,8 @@ SortedErrors CollectErrors(const std::shared_ptr<const Model>& model,
     for (size_t i = 0; i < rollouts[r].transitions.size(); ++i) {
       const Transition& t = rollouts[r].transitions[i];
       const bool follows = last && last->step + 1 == t.step;
-      const Eigen::VectorXd effort = MeanEffort(t), before = follows ? MeanEffort(*last) : effort;
+      const Eigen::VectorXd effort = t.mean_effort(),
+                            before = follows ? last->mean_effort() : effort;
       if (t.next_q.allFinite() && t.next_v.allFinite() && !links_touch(t)) {
         BeginTransition(rollouts[r], i, &simulator);
         inputs.Begin(simulator);

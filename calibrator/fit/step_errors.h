@@ -12,9 +12,6 @@
 
 namespace plumb {
 
-/// [Nm or N] of each velocity, over the step. Thread-safe.
-Eigen::VectorXd MeanEffort(const Transition& transition);
-
 /// One-step errors of a simulator in n positions and n velocities, for a residual to learn from:
 /// an entry of each list for each transition.
 struct StepErrors {

@@ -26,8 +26,9 @@ namespace {
 using nlohmann::json;
 
 // Version 2: without the method used, its warnings and a search's samples; 3: without a residual; 4
-// to 6: with another; 7: without a checksum; 8: without the number of roll-outs that are forgotten
-constexpr FileKind kKind{"PLUMBCAL", 9, "a calibrator's checkpoint"};
+// to 6: with another; 7: without a checksum; 8: without the number of roll-outs that are forgotten;
+// 9: without information
+constexpr FileKind kKind{"PLUMBCAL", 10, "a calibrator's checkpoint"};
 
 json ToJson(const Eigen::VectorXd& x) { return std::vector<double>(x.begin(), x.end()); }
 
@@ -59,6 +60,22 @@ Gaussian GaussianFrom(const json& j) {
   p.covariance = Eigen::MatrixXd::Map(values.data(), n, n);
   LogDensity(p, p.mean);  // throws unless it is positive definite
   return p;
+}
+
+// JSON has no NaN.
+double NumberOrNaN(const json& j) {
+  return j.is_null() ? std::numeric_limits<double>::quiet_NaN() : j.get<double>();
+}
+
+// @param n parameters.
+Eigen::MatrixXd InformationFrom(const json& j, Eigen::Index n) {
+  if (j.empty()) return {};
+  if (static_cast<Eigen::Index>(j.size()) != n * n)
+    throw std::runtime_error("information has the wrong size");
+  Eigen::MatrixXd information(n, n);
+  for (Eigen::Index i = 0; i < n * n; ++i)
+    information.reshaped()(i) = NumberOrNaN(j.at(static_cast<size_t>(i)));
+  return information;
 }
 
 json ToJson(const GaussianMixture& mixture) {
@@ -98,11 +115,6 @@ std::vector<int> WholeNumbers(const json& j) {
   std::vector<int> numbers;
   for (const json& number : j) numbers.push_back(Whole(number));
   return numbers;
-}
-
-// JSON has no NaN.
-double NumberOrNaN(const json& j) {
-  return j.is_null() ? std::numeric_limits<double>::quiet_NaN() : j.get<double>();
 }
 
 // The samples alone: the rest follows from the state. JSON writes -infinity, a failure's density,
@@ -297,6 +309,7 @@ void CalibrationCheckpoint::Save(const SimOpt::State& state) {
                {"alarm", state.alarm},
                {"gap", state.gap},
                {"informed", Name(state.informed)},
+               {"information", ToJson(state.information.reshaped())},
                {"rollouts_per_iteration", state.rollouts_per_iteration},
                {"forgotten", state.forgotten}};
   WriteJson(folder_ / kStateFile, j);
@@ -331,6 +344,7 @@ std::optional<SimOpt::State> CalibrationCheckpoint::Load() const {
     state.residual = ResidualFrom(j.at("residual"), robot_);
     state.alarm = j.at("alarm"), state.gap = j.at("gap");
     state.informed = InformedFrom(j.at("informed"));
+    state.information = InformationFrom(j.at("information"), state.search.distribution.mean.size());
     state.rollouts_per_iteration = WholeNumbers(j.at("rollouts_per_iteration"));
     const size_t count = Count(state.rollouts_per_iteration);
     state.forgotten = Whole(j.at("forgotten"));

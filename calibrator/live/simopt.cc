@@ -172,6 +172,7 @@ void SimOpt::Infer() {
     const GapFit fit = RunFromWhereItIs();
     const MethodResult& result = fit.result;
     state_.residual = fit.gap.residual, state_.informed = fit.gap.informed;
+    state_.information = fit.information;
     state_.alarm = fit.alarm.alarm ? fit.alarm.summary : "";
     state_.gap = fit.alarm.judged ? fit.gap.summary : fit.alarm.summary;
     state_.kl = KlDivergence(Moments(result.posterior), Moments(state_.before));
@@ -233,10 +234,12 @@ std::optional<CalibrationReport> SimOpt::Report() {
     const Eigen::VectorXd errors = discrepancy_.PredictionError(physical, newest, horizon);
     report.errors.push_back({horizon, errors(0), errors(1), errors(2)});
   }
-  report.identifiability = FindIdentifiability(
-      robot_, discrepancy_,
-      InformingSteps(model_, Moments(state_.distribution).mean, state_.rollouts, state_.informed),
-      Moments(state_.distribution));
+  const Gaussian moments = Moments(state_.distribution);
+  report.identifiability =
+      state_.information.size() > 0
+          ? FindIdentifiability(robot_, state_.information,
+                                prior_.covariance.diagonal().cwiseSqrt(), moments)
+          : FindIdentifiability(robot_, discrepancy_, state_.rollouts, moments);
   if (state_.informed == Informed::kNone)
     report.identifiability.summary = fmt::format("no parameter is determined: {}", kNotInformed);
   report.failures = discrepancy_.failures();

@@ -89,6 +89,9 @@ class SimOpt {
     /// that its simulators lack; null = nothing, or nothing is known of it
     std::shared_ptr<const Residual> residual;
     Informed informed = Informed::kAll;  ///< which steps the parameters are learnt from
+    /// Fisher information of the coordinates that the distribution rests on, n x n; empty = of a
+    /// search, or nothing was recorded
+    Eigen::MatrixXd information;
     /// what the model does not explain of what was recorded, empty = no alarm; and what was done
     /// about it, or why nothing was, or that nobody can tell: empty where the model explains it
     std::string alarm, gap;

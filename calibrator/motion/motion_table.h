@@ -11,10 +11,6 @@ namespace plumb {
 
 // The functions here share nothing: thread-safe.
 
-/// Rows follow each other if they are a control period apart but for this share of it, as
-/// TransitionJoiner has it.
-inline constexpr double kPeriodTolerance = 0.2;
-
 /// A row of a table of motion as it stands.
 struct MotionRow {
   double t;                ///< [s], finite

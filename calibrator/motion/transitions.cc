@@ -66,6 +66,12 @@ double Transition::duration() const {
       [](double sum, const EffortSegment& segment) { return sum + segment.duration; });
 }
 
+Eigen::VectorXd Transition::mean_effort() const {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(efforts.front().effort.size());
+  for (const EffortSegment& segment : efforts) sum += segment.duration * segment.effort;
+  return sum / duration();
+}
+
 std::string DropCounts::summary() const {
   std::string summary = fmt::format("{} gap{}, {} late, {} not finite, {} across restarts", gap,
                                     gap == 1 ? "" : "s", late, not_finite, restart);
@@ -194,7 +200,7 @@ bool TransitionJoiner::JoinOne(int64_t from, int64_t to, Transition* transition,
     return false;
   }
   const double duration = Seconds(last->second.utime - first->second.utime);
-  if (!(std::abs(duration - period_) <= 0.2 * period_)) {
+  if (!(std::abs(duration - period_) <= kPeriodTolerance * period_)) {
     ++drops->late;
     return false;
   }

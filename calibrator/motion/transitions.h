@@ -30,7 +30,8 @@ struct Transition {
   /// Directions, columns of 2 n entries (positions, velocities), each a standard deviation long, in
   /// which something that no simulator is asked for has moved the end; none = nothing has.
   Eigen::MatrixXd disturbance = {};
-  double duration() const;
+  double duration() const;              ///< [s]
+  Eigen::VectorXd mean_effort() const;  ///< over the step, [Nm or N] of each velocity
 };
 
 /// The usable transitions of one episode, in order of time.
@@ -43,11 +44,15 @@ struct Rollout {
 /// The number of transitions.
 size_t CountTransitions(std::span<const Rollout> rollouts);
 
+/// A step of the record is one control period but for this share of it.
+inline constexpr double kPeriodTolerance = 0.2;
+
 /// Why transitions were left out, counted since the start. Nothing is ever guessed.
 struct DropCounts {
   int64_t gap = 0;   ///< a state or a command is missing
-  int64_t late = 0;  ///< the interval is not one control period (within 20 %)
-  /// or not physical (robot/physical.h), or an effort is unknown, or a quaternion is no unit one
+  int64_t late = 0;  ///< the interval is not one control period (within kPeriodTolerance)
+  /// a number is not finite or not physical (robot/physical.h), an effort is unknown, or a
+  /// quaternion is no unit one
   int64_t not_finite = 0;
   int64_t restart = 0;  ///< the estimator's filter restarted within the interval
   /// the simulator's dynamics are in a state: what it tells of parameters is what was put in

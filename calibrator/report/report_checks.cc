@@ -42,9 +42,12 @@ std::string PredictionPanel(const Holdout& holdout) {
 std::string MisfitPanel(const Findings& findings) {
   const Misspecification& model = findings.misspecification;
   const std::string title = "What the alarm says",
-                    what = fmt::format(
-                        "Mean squared whitened one-step error: {} (1 = down to the noise).",
-                        Number(findings.discrepancy, 0.01)),
+                    what = std::isnan(findings.discrepancy)
+                               ? "The noise is estimated from the errors themselves."
+                               : fmt::format(
+                                     "Mean squared whitened one-step error: {} (1 = down to the "
+                                     "noise).",
+                                     Number(findings.discrepancy, 0.01)),
                     summary =
                         Paragraph(model.summary.empty() && !model.alarm ? "This was not tested."
                                                                         : model.summary);

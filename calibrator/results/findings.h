@@ -53,7 +53,7 @@ struct Findings {
   int64_t diagnostic_steps = 0;  ///< and for the diagnostics
   int64_t failures = 0;          ///< simulations that failed
   /// mean squared whitened one-step error of the mean that all transitions have informed; 1 = down
-  /// to the noise
+  /// to the noise; NaN where nobody knows the noise
   double discrepancy = 0;
   /// of each entry of (q, v), estimated or as recorded, physical units
   Eigen::VectorXd noise_sd;

@@ -145,10 +145,7 @@ void Driver::Tick(int64_t now, int64_t utime, int64_t lateness) noexcept {
   SetTime(now, utime);
   StampStopTime();
   NoteLateness(lateness);
-  for (Bus& bus : buses_) {
-    bus.housekeeping.Clear();
-    bus.frames.Clear();
-  }
+  for (Bus& bus : buses_) bus.frames.Clear();
   CheckHealth();
   CheckCommand();
   StampStopTime();
@@ -162,17 +159,14 @@ void Driver::Tick(int64_t now, int64_t utime, int64_t lateness) noexcept {
   for (size_t i = 0; i < joints_.size(); ++i) {
     Joint& joint = joints_[(turn_ + i) % joints_.size()];
     Bus& bus = buses_[joint.bus];
-    const size_t before = bus.housekeeping.size();
-    joint.motor->Tick(now, bus.arming_room >= kMaxArmingFrames, bus.housekeeping);
-    bus.arming_room -= std::min(bus.arming_room, bus.housekeeping.size() - before);
-    joint.frames_end = bus.torque_frames + bus.housekeeping.size();
+    const size_t before = bus.frames.size();
+    joint.motor->Tick(now, bus.arming_room >= kMaxArmingFrames, bus.frames);
+    bus.arming_room -= std::min(bus.arming_room, bus.frames.size() - before);
+    joint.frames_end = bus.frames.size();
   }
   turn_ = (turn_ + 1) % joints_.size();
   Poll();
-  for (JointSensor& sensor : sensors_) sensor.device().Tick(now, buses_[sensor.bus()].housekeeping);
-  for (Bus& bus : buses_) {
-    for (const Frame& frame : bus.housekeeping.frames()) bus.frames.Push(frame);
-  }
+  for (JointSensor& sensor : sensors_) sensor.device().Tick(now, buses_[sensor.bus()].frames);
   NoteChanges();
 }
 
@@ -238,7 +232,7 @@ void Driver::Poll() noexcept {
       Motor& motor = *joint.motor;
       if (joint.bus != b || motor.num_polled() == 0 || motor.state() == DriveState::kAbsent)
         continue;
-      motor.Poll(bus.housekeeping);
+      motor.Poll(bus.frames);
       bus.poll_turn = (bus.poll_turn + i + 1) % joints_.size();
       break;
     }

@@ -136,8 +136,8 @@ class Driver {
     int64_t received = 0, rejected = 0;  // frames
     std::vector<Filter> own;             // of the frames that only we may send
 
-    FrameBatch frames, housekeeping;  // of this cycle: all; those that are no torques
-    size_t torque_frames = 0;
+    FrameBatch frames;               // of this cycle
+    size_t torque_frames = 0;        // the first of them
     size_t arming_room = 0;          // frames that arming may still take in this cycle
     int64_t poll_period, next_poll;  // [us] one question to one drive
     size_t poll_turn = 0;
@@ -154,8 +154,9 @@ class Driver {
   static std::vector<Joint> DrivenJoints(const RobotDescription& robot);
   /// @throws std::invalid_argument if one cannot work.
   std::vector<Bus> Buses(const RobotDescription& robot) const;
-  /// Of the joints without a motor. @throws std::invalid_argument if nothing measures one.
-  void FindMeasuring(const RobotDescription& robot);
+  /// Which sensors measure the joints without a motor. @throws std::invalid_argument if nothing
+  /// measures one.
+  void FindPassiveSensors(const RobotDescription& robot);
   void FindSecondEncoders(const RobotDescription& robot);
   bool DispatchToMotors(size_t bus, const Frame& frame, int64_t now, int64_t utime) noexcept;
   bool DispatchToSensors(size_t bus, const Frame& frame, int64_t now, int64_t utime) noexcept;

@@ -141,15 +141,18 @@ driver_status_t& Driver::Status(int64_t utime, std::span<const TransportStats> s
     status_.joint_reason[i] = motor.reason();
     const MotorReadings readings = motor.readings();
     if (Unwatched(joints_[k])) {
-      status_.joint_reason[i] =
-          fmt::format("no temperatures for {} ms: if it gets too hot, nobody will know",
-                      (now_ - readings.temperatures_at) / 1000);
+      Reason unwatched;
+      unwatched.Set("no temperatures for {} ms: if it gets too hot, nobody will know",
+                    (now_ - readings.temperatures_at) / 1000);
+      status_.joint_reason[i] = unwatched.text();
     }
     status_.motor_temperature[i] = readings.motor_temperature;
     status_.drive_temperature[i] = readings.drive_temperature;
     status_.bus_voltage[i] = readings.bus_voltage;
     if (status_.state == driver_status_t::ABSENT && motor.state() == DriveState::kAbsent) {
-      status_.reason = joints_[k].name + ": " + status_.joint_reason[i];
+      Reason absent;
+      absent.Set("{}: {}", joints_[k].name, status_.joint_reason[i]);
+      status_.reason = absent.text();
     }
   }
   for (size_t k = 0; k < sensors_.size(); ++k) {

@@ -102,8 +102,7 @@ void Driver::RequestArm(int64_t made, bool homed) noexcept {
     } else if (Reason bad; !WithinOperatingLimits(joint.motor->readings(), settings_, bad)) {
       why.Set("{}: {}", joint.name, bad.text());
     }
-    if (homed) joint.motor->Homed();
-    if (joint.motor->lost_place())
+    if (joint.motor->lost_place() && !homed)
       why.Set("{}: its drive has lost its place: home the joint, then plumb arm --homed",
               joint.name);
     if (!why.text().empty()) return Refuse(why.text());
@@ -128,6 +127,7 @@ void Driver::RequestArm(int64_t made, bool homed) noexcept {
   forgery_ = {};
   cause_.Clear();
   for (Joint& joint : joints_) {
+    if (homed) joint.motor->Homed();
     joint.motor->Arm(now);
     joint.watch.ClearComplaint();
     joint.commanded = 0;

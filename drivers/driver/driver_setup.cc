@@ -17,7 +17,20 @@
 namespace plumb {
 namespace {
 
-constexpr int kHistory = 2048;  // cycles of transmitted efforts: ten seconds
+constexpr int kHistory = 2048;  // cycles of transmitted efforts: 4 s of 2 ms
+
+// What nobody but us may send to that motor.
+std::vector<Filter> OwnFilters(const MotorDescription& motor, const DriverSettings& settings) {
+  std::vector<Filter> own;
+  for (const BusMessage& message : MotorBusDevice(motor, settings).messages) {
+    if (message.direction != BusMessage::Direction::kToDevice || message.remote) continue;
+    own.push_back({.id = message.id,
+                   .mask = (message.extended ? Filter::kAllExtended : 0x7FF) & ~message.sender_bits,
+                   .own = true,
+                   .extended = message.extended});
+  }
+  return own;
+}
 
 MotorTiming TimingOf(const DriverSettings& settings) {
   return {Microseconds(settings.heartbeat_timeout)};
@@ -60,7 +73,7 @@ Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
   for (const SensorDescription& sensor : robot.sensors)
     sensors_.emplace_back(robot, sensor, stale_after_);
   buses_ = Buses(robot);
-  FindMeasuring(robot);
+  FindPassiveSensors(robot);
   FindSecondEncoders(robot);
   effort_sent_.assign(num_joints_, 0);
   scratch_.resize(joints_.size());
@@ -98,6 +111,11 @@ std::vector<Driver::Bus> Driver::Buses(const RobotDescription& robot) const {
     for (const Joint& joint : joints_) polled += joint.bus == i ? joint.motor->num_polled() : 0;
     Bus bus;
     if (!description.name.empty()) bus.prefix = description.Label() + ": ";
+    for (const JointDescription& joint : robot.joints) {
+      if (joint.passive || joint.motor.bus != i) continue;
+      const std::vector<Filter> own = OwnFilters(joint.motor, robot.driver);
+      bus.own.insert(bus.own.end(), own.begin(), own.end());
+    }
     bus.foreign_at = start_now_ - start_guard_ - 1;
     bus.poll_period = std::max(cycle_, Microseconds(settings_.telemetry) / std::max(1, polled));
     bus.next_poll = start_now_;
@@ -106,22 +124,12 @@ std::vector<Driver::Bus> Driver::Buses(const RobotDescription& robot) const {
   return buses;
 }
 
-void Driver::FindMeasuring(const RobotDescription& robot) {
+void Driver::FindPassiveSensors(const RobotDescription& robot) {
   std::optional<FloatingBase> base;
   if (robot.estimator.base == EstimatorSettings::Base::kLegs) base = FloatingBaseOf(robot);
   for (size_t i = 0; i < num_joints_; ++i) {
     const JointDescription& joint = robot.joints[i];
-    if (!joint.passive) {
-      for (const BusMessage& message : MotorBusDevice(joint.motor, robot.driver).messages) {
-        if (message.direction != BusMessage::Direction::kToDevice || message.remote) continue;
-        buses_[joint.motor.bus].own.push_back(
-            {.id = message.id,
-             .mask = (message.extended ? Filter::kAllExtended : 0x7FF) & ~message.sender_bits,
-             .own = true,
-             .extended = message.extended});
-      }
-      continue;
-    }
+    if (!joint.passive) continue;
     const auto sensor = std::ranges::find(sensors_, static_cast<int>(i), &JointSensor::joint);
     // the estimator finds out
     if (sensor == sensors_.end() && base && base->Has(static_cast<int>(i))) continue;

@@ -6,14 +6,13 @@
 
 #include "common/time_units.h"
 #include "estimator/kinematic_filter.h"
+#include "estimator/square.h"
 #include "robot/motion_noise.h"
 
 namespace plumb {
 namespace {
 
 constexpr double kSurely = 5;  // standard deviations
-
-constexpr double Square(double x) { return x * x; }
 
 // A JOINT_STATE has one number per joint. A semi-implicit step is of first order: with substeps as
 // long as gym's, its error would be greater than the noise.

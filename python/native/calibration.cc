@@ -163,7 +163,8 @@ void BindCalibration(py::module_& module) {
       "transitions", [](const Findings& f) { return f.transitions; }, "Learnt from.");
   finding(
       "discrepancy", [](const Findings& f) { return f.discrepancy; },
-      "Mean squared one-step error in units of its uncertainty; 1 = down to the noise.");
+      "Mean squared one-step error in units of its uncertainty; 1 = down to the noise; NaN where "
+      "nobody knows the noise.");
   finding(
       "alarm", [](const Findings& f) { return f.misspecification.alarm; },
       "Whether the model cannot explain the robot.");

@@ -94,7 +94,7 @@ py::dict Episode(const Rollout& rollout) {
   };
   add("q", &Transition::q), add("v", &Transition::v);
   add("next_q", &Transition::next_q), add("next_v", &Transition::next_v);
-  episode["effort"] = Rows(rollout.transitions, MeanEffort);
+  episode["effort"] = Rows(rollout.transitions, std::mem_fn(&Transition::mean_effort));
   std::vector<int> steps;
   std::vector<double> durations;
   for (const Transition& t : rollout.transitions)

@@ -3,15 +3,15 @@
 #include "robot/settings/ranges.h"
 
 namespace plumb {
-namespace {
 
-const std::vector<std::string> kLiveMethods{"auto", "laplace", "mixture", "reps", "simopt"};
-
-}  // namespace
+const std::vector<std::string>& LiveMethods() {
+  static const std::vector<std::string> methods{"auto", "laplace", "mixture", "reps", "simopt"};
+  return methods;
+}
 
 CalibrationSettings ReadCalibration(Config config) {
   CalibrationSettings s;
-  s.method = kLiveMethods[static_cast<size_t>(config.Choice("method", kLiveMethods, 0))];
+  s.method = LiveMethods()[static_cast<size_t>(config.Choice("method", LiveMethods(), 0))];
   s.samples = config.Integer("samples", {4, 1e6});
   s.updates = config.Integer("updates", {1, 1000});
   s.kl = config.Number("kl", kSanePositive);

@@ -9,7 +9,7 @@ namespace plumb {
 
 /// [calibration]: of the live calibrator.
 struct CalibrationSettings {
-  std::string method;  ///< of the live calibrator, see SimOpt
+  std::string method;  ///< one of LiveMethods(), see SimOpt
   int samples, updates;
   double kl, min_temperature;
   std::vector<int> horizons;
@@ -20,6 +20,9 @@ struct CalibrationSettings {
   bool velocities = true;
   double duration = 0;  ///< [s] >= 0 that a calibration takes in virtual time
 };
+
+/// The methods of calibration that the loop has.
+const std::vector<std::string>& LiveMethods();
 
 /// Thread-safe. @throws ConfigError
 CalibrationSettings ReadCalibration(Config config);

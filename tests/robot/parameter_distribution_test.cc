@@ -35,6 +35,15 @@ TEST_CASE("The prior has the description's mean and variance in physical units")
   CHECK(prior.Sd()[1] == Approx(.1));
 }
 
+TEST_CASE("The nominal simulator is that of the prior's means, in physical units") {
+  const ParameterDistribution nominal = ParameterDistribution::Nominal(Robot());
+  Random random(1);
+  const Eigen::VectorXd drawn = nominal.Sample(random);
+  CHECK(drawn[0] == Approx(10.4).epsilon(1e-12));
+  CHECK(drawn[1] == Approx(-.2));
+  CHECK(nominal.Sd().isZero());
+}
+
 TEST_CASE("Samples have the distribution's moments, also those of a correlated mixture") {
   const ParameterDistribution distribution =
       ParameterDistribution::FromMessage(TwoComponents(), Robot());

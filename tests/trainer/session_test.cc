@@ -197,6 +197,7 @@ TEST_CASE("A newer distribution of the iteration takes effect at the next batch"
   CHECK_FALSE(session.Replace(newer));
   newer.iteration = 0;
   REQUIRE(session.Replace(newer));
+  CHECK_FALSE(session.Replace(newer));
   CHECK(session.update() == 1);
   CHECK(session.Policy(1).weight == undisturbed.Policy(1).weight);
   for (TrainingSession* s : {&session, &undisturbed}) s->Advance();
@@ -204,6 +205,16 @@ TEST_CASE("A newer distribution of the iteration takes effect at the next batch"
   CHECK(session.MakeCheckpoint().distribution.mean[0] == newer.mixture.components[0].mean[0]);
   TrainToTheEnd(session);
   CHECK_FALSE(session.Replace(Distribution(0)));  // its policy is out
+}
+
+TEST_CASE("A distribution that differs in its residual or in its starts alone is another") {
+  TrainingSession session = NewSession();
+  session.Begin(Distribution(0));
+  CHECK(session.Replace(Lacking(0)));
+  CHECK_FALSE(session.Replace(Lacking(0)));
+  ParameterDistribution elsewhere = Lacking(0);
+  elsewhere.starts = {Eigen::Vector2d(1, 0)};
+  CHECK(session.Replace(elsewhere));
 }
 
 // Nothing that is sent may end the trainer.

@@ -201,7 +201,7 @@ TEST_CASE("all modes of a posterior are kept in checkpoints and told to the trai
   std::string bytes = ReadFile(folder / "calibration.checkpoint");
   bytes[8] = 7;  // the version
   std::ofstream(folder / "calibration.checkpoint") << bytes;
-  CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("has version 7, not 9"));
+  CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("has version 7, not 10"));
 }
 
 TEST_CASE("what is said of an iteration stays as it is while the next one is under way") {
@@ -259,7 +259,7 @@ TEST_CASE("what the simulators lack is told to the trainer again after a resumpt
   CHECK(told(*loaded) == told(state));
   CHECK(told(*loaded) != told(simopt.state()));
 
-  const FileKind kind{"PLUMBCAL", 9, "a calibrator's checkpoint"};
+  const FileKind kind{"PLUMBCAL", 10, "a calibrator's checkpoint"};
   const std::string bytes = ReadFile(folder / "calibration.checkpoint");
   const std::string text(CheckedContent(kind, bytes));
   const size_t at = text.find("\"residual\":\"") + 12;

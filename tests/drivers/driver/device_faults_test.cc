@@ -153,6 +153,32 @@ TEST_CASE("fault 12: a drive restarts", "[fault]") {
               .within = 60});
 }
 
+TEST_CASE("a request that homes is obeyed for all joints, or for none") {
+  BusRig rig;
+  rig.Start();
+  REQUIRE(rig.Arm(1));
+  for (CanSimpleDevice& drive : rig.drives) drive.Reboot(rig.now);
+  rig.silent = [](const Frame& frame) { return FromKnee(frame) || frame.id >> 5 == 1; };
+  rig.Run(300);
+  rig.silent = BusRig::Nothing;
+  for (auto& sample : rig.samples) sample.position += 0.4;
+  rig.commanding = false;
+  rig.Run(300);
+  // Refused for the second joint, which is not heard: the first one is not homed either.
+  rig.silent = FromKnee;
+  rig.Run(100);
+  rig.Request(driver_request_t::ARM_HOMED);
+  rig.Run(10);
+  CHECK_THAT(rig.Reason(), Contains("ARM refused: knee1"));
+  rig.silent = BusRig::Nothing;
+  rig.Run(600);
+  rig.Request(driver_request_t::ARM);
+  rig.Run(10);
+  CHECK_THAT(rig.Reason(), Contains("pivot: its drive has lost its place"));
+  rig.Request(driver_request_t::ARM_HOMED);
+  CHECK(rig.RunUntil(DriveState::kArmed) >= 0);
+}
+
 TEST_CASE("fault 13: heartbeats stay away, encoder estimates do not", "[fault]") {
   ExpectStop(
       {.number = "13",

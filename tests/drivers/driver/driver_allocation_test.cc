@@ -108,6 +108,35 @@ TEST_CASE("a thousand cycles with commands, faults and re-arming allocate nothin
   CHECK(after == before + 1);
 }
 
+TEST_CASE("a status whose texts are as long as before allocates nothing") {
+  Rig rig(2);
+  rig.robot.driver.telemetry = 0.1;
+  rig.Start();
+  REQUIRE(rig.Arm(1));
+  rig.to_driver = [](Frame& frame) { return (frame.id & 0x1F) != 0x15; };  // Get_Temperature
+  const auto says = [&](const std::string& of_joint, const std::string& in_all) {
+    const long before = allocations;
+    const driver_status_t& status = rig.Status();
+    const long after = allocations;
+    CHECK(status.joint_reason[0].find(of_joint) != std::string::npos);
+    CHECK(status.reason.find(in_all) != std::string::npos);
+    return after - before;
+  };
+  rig.Run(2000);
+  says("no temperatures for 2", "");
+  rig.Run(100);
+  CHECK(says("no temperatures for 2", "") == 0);
+  // Absent drives: the whole of it says which one.
+  rig.to_driver = [](Frame&) { return false; };
+  rig.commanding = false;
+  rig.Run(1000);
+  rig.Request(driver_request_t::DISARM);
+  rig.Run(1000);
+  says("", "pivot: ");
+  rig.Run(100);
+  CHECK(says("", "pivot: ") == 0);
+}
+
 TEST_CASE("judging signatures, and what comes of it, allocates nothing") {
   const TemporaryFolder folder;
   MakeKeyFile(folder / "key");
