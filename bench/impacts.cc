@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "calibrator/motion/touch.h"
+#include "sim/touch.h"
 #include "tests/calibrator/hop_on_bus.h"
 #include "tests/estimator/observer_errors.h"
 
@@ -25,7 +25,7 @@ constexpr const char* kNames[] = {"in the air", "on the ground", "touchdown, lif
 std::vector<When> WhenOf(const RobotDescription& robot, const Samples& motion) {
   std::vector<Touch> touch;
   for (const SimulatedReadings::Sample& sample : motion)
-    touch.push_back(FindTouch(robot, sample.q));
+    touch.push_back(TouchFinder(robot).Find(sample.q));
   std::vector<When> when;
   const int n = static_cast<int>(motion.size());
   for (int k = 0; k < n; ++k) {

@@ -37,6 +37,12 @@ Touch TouchFinder::Find(const Eigen::Ref<const Eigen::VectorXd>& q) {
   return {ground, stop, LinksTouch()};
 }
 
+Touch TouchFinder::OfStep(const Eigen::Ref<const Eigen::VectorXd>& q,
+                          const Eigen::Ref<const Eigen::VectorXd>& next_q) {
+  const Touch begin = Find(q);
+  return next_q.allFinite() ? begin | Find(next_q) : begin;
+}
+
 bool TouchFinder::LinksTouch() {
   return std::any_of(pairs_.begin(), pairs_.end(), [this](const auto& pair) {
     NearSpots spots;

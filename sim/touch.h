@@ -34,6 +34,10 @@ class TouchFinder {
 
   /// @param q as in RobotDescription. @throws std::invalid_argument if q has the wrong size.
   Touch Find(const Eigen::Ref<const Eigen::VectorXd>& q);
+  /// Of a step: at its beginning or its end. @param next_q that is not finite was not observed: the
+  /// beginning has to do.
+  Touch OfStep(const Eigen::Ref<const Eigen::VectorXd>& q,
+               const Eigen::Ref<const Eigen::VectorXd>& next_q);
 
  private:
   struct Stop {

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "calibrator/inference/chi_squared.h"
-#include "calibrator/motion/touch.h"
 #include "common/decompositions.h"
+#include "sim/touch.h"
 
 namespace plumb {
 namespace {
@@ -76,22 +76,18 @@ ProjectedErrors::ProjectedErrors(const RobotDescription& robot, const FitResidua
     index.emplace(std::pair(row.rollout, row.transition), 0);
   if (!residuals.where.empty() && residuals.where.size() != index.size())
     throw std::invalid_argument("it is not known of each transition where it was");
+  TouchFinder finder(robot);
   int ground = 0, stop = 0, links = 0;
   for (auto& [key, number] : index) {
     number = static_cast<int>(steps.size());
     const auto& transitions = residuals.rollouts[static_cast<size_t>(key.first)].transitions;
     const Transition& transition = transitions[static_cast<size_t>(key.second)];
-    Touch touch;
-    Eigen::VectorXd q = transition.q, v = transition.v;
-    if (residuals.where.empty()) {
-      touch = FindTouch(robot, transition);
-    } else {
+    Eigen::VectorXd q = transition.q, v = transition.v, next_q = transition.next_q;
+    if (!residuals.where.empty()) {
       const Whereabouts& where = residuals.where[static_cast<size_t>(number)];
-      q = where.q, v = where.v;
-      touch = FindTouch(robot, where.q);
-      const Touch end = where.next_q.allFinite() ? FindTouch(robot, where.next_q) : touch;
-      touch = touch | end;
+      q = where.q, v = where.v, next_q = where.next_q;
     }
+    const Touch touch = finder.OfStep(q, next_q);
     ground += touch.ground;
     stop += touch.stop;
     links += touch.links;

@@ -37,9 +37,6 @@ SortedErrors CollectErrors(const std::shared_ptr<const Model>& model,
   simulator.SetParameters(physical);
   // What links do to each other is no contact that a function or a disturbance is made for.
   TouchFinder touch(model->Describe(physical), margin);
-  const auto links_touch = [&](const Transition& t) {
-    return touch.Find(t.q).links || touch.Find(t.next_q).links;
-  };
   for (size_t r = 0; r < rollouts.size(); ++r) {
     const Transition* last = nullptr;
     for (size_t i = 0; i < rollouts[r].transitions.size(); ++i) {
@@ -47,7 +44,7 @@ SortedErrors CollectErrors(const std::shared_ptr<const Model>& model,
       const bool follows = last && last->step + 1 == t.step;
       const Eigen::VectorXd effort = t.mean_effort(),
                             before = follows ? last->mean_effort() : effort;
-      if (t.next_q.allFinite() && t.next_v.allFinite() && !links_touch(t)) {
+      if (t.next_q.allFinite() && t.next_v.allFinite() && !touch.OfStep(t.q, t.next_q).links) {
         BeginTransition(rollouts[r], i, &simulator);
         inputs.Begin(simulator);
         simulator.Step(t.efforts);

@@ -171,9 +171,8 @@ std::vector<Rollout> FreeSteps(const RobotDescription& robot, std::span<const Ro
   TouchFinder touch(robot, Residual::kTouchMargin);
   std::vector<Rollout> free(rollouts.begin(), rollouts.end());
   for (Rollout& rollout : free) {
-    std::erase_if(rollout.transitions, [&](const Transition& t) {
-      return touch.Find(t.q).any() || (t.next_q.allFinite() && touch.Find(t.next_q).any());
-    });
+    std::erase_if(rollout.transitions,
+                  [&](const Transition& t) { return touch.OfStep(t.q, t.next_q).any(); });
   }
   return free;
 }

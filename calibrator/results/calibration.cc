@@ -13,17 +13,13 @@
 #include "calibrator/fit/methods.h"
 #include "calibrator/fit/physical_columns.h"
 #include "calibrator/gap/gap.h"
-#include "calibrator/inference/chi_squared.h"
 #include "calibrator/motion/differences.h"
-#include "common/decompositions.h"
 #include "common/time_units.h"
 #include "robot/parameter_distribution.h"
 
 namespace plumb {
 namespace {
 
-// p below which logs are of different robots, or the model is wrong
-constexpr double kDisagreement = 1e-3;
 constexpr char kCure[] =
     "; train on posterior and residual together (plumb train --distribution), and, as a residual "
     "is right only near what it was learnt from, record the trained policy's motion and calibrate "
@@ -107,7 +103,8 @@ class Calibration {
 
   void FindWhatIsKnown(const Eigen::MatrixXd& information) {
     findings_.identifiability =
-        FindIdentifiability(robot_, information, prior_sd(), Moments(findings_.posterior));
+        FindIdentifiability(robot_, information, findings_.prior.covariance.diagonal().cwiseSqrt(),
+                            Moments(findings_.posterior));
     if (!informed())
       findings_.identifiability.summary =
           fmt::format("no parameter is determined: {}", kNotInformed);
@@ -191,122 +188,21 @@ class Calibration {
       agreement.summary = fmt::format("the logs cannot be compared: {}", kNotInformed);
       return;
     }
-    std::vector<LaplaceFit> fits;
-    std::vector<std::string> names;
+    std::vector<LogFit> fits;
     for (size_t i = 0; i < logs_.size(); ++i) {
-      const Log& log = logs_[i];
+      const std::string& name = logs_[i].name;
       try {
         CurriculumOptions options;
         options.horizons = options_.horizons, options.execution = options_.execution,
         options.starts = 1;
         const CurriculumFit own = FitCurriculum(model_, Informing(own_[i]), options, mean_);
         findings_.diagnostic_steps += own.simulated_steps;
-        fits.push_back(own.fit);
-        names.push_back(log.name);
+        fits.push_back({name, own.fit});
       } catch (const std::invalid_argument& error) {
-        findings_.warnings.push_back(fmt::format("{} on its own: {}", log.name, error.what()));
+        findings_.warnings.push_back(fmt::format("{} on its own: {}", name, error.what()));
       }
     }
-    for (size_t i = 0; i < fits.size(); ++i) agreement.logs.push_back(Against(names[i], fits, i));
-    if (fits.size() < 2) {
-      agreement.summary =
-          "fewer than two of the logs can be fitted on their own: nothing to compare";
-      return;
-    }
-    std::string against;
-    for (const LogAgreement& log : agreement.logs) {
-      if (log.p >= kDisagreement) continue;
-      agreement.agree = false;
-      against +=
-          fmt::format("{}{} ({:.1f} sd)", against.empty() ? "" : ", ", log.log, log.distance);
-    }
-    agreement.summary = agreement.agree
-                            ? fmt::format("the {} logs agree", agreement.logs.size())
-                            : "the logs do not agree with each other: " + against +
-                                  "; they are of different robots, or the model is wrong "
-                                  "in a way that depends on the motion";
-  }
-
-  // A log's likelihood against that of the others together, both quadratic: their modes differ by a
-  // normal vector with the sum of both covariances, in the directions that both determine.
-  LogAgreement Against(const std::string& name, const std::vector<LaplaceFit>& fits,
-                       size_t i) const {
-    const Eigen::Index n = findings_.prior.mean.size();
-    const LaplaceFit& own = fits[i];
-    Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n, n);
-    Eigen::VectorXd weighted = Eigen::VectorXd::Zero(n);
-    for (size_t k = 0; k < fits.size(); ++k) {
-      if (k == i) continue;
-      information += Data(fits[k]);
-      weighted += Data(fits[k]) * LikelihoodMode(fits[k]);
-    }
-    const Eigen::VectorXd sd = prior_sd();
-    const auto scaled = [&](const Eigen::MatrixXd& m) -> Eigen::MatrixXd {
-      return sd.asDiagonal() * m * sd.asDiagonal();
-    };
-    // Pseudo-inverses in the prior's units: directions with less information than the prior has do
-    // not count.
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> mine(scaled(Data(own))),
-        theirs(scaled(information));
-    const auto pseudo =
-        [](const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>& eigen) -> Eigen::MatrixXd {
-      const Eigen::ArrayXd values = eigen.eigenvalues().array();
-      const Eigen::VectorXd inverse = (values > 1).select(1 / values.max(1e-300), 0.0);
-      return eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose();
-    };
-    const Eigen::VectorXd their_mode =
-        sd.asDiagonal() * pseudo(theirs) * sd.asDiagonal() * weighted;
-    Eigen::MatrixXd both(n, 0);
-    const Eigen::MatrixXd my_projector = Projector(mine), their_projector = Projector(theirs);
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> common(
-        Eigen::MatrixXd(my_projector * their_projector * my_projector));
-    const Eigen::Index rank = (common.eigenvalues().array() > 0.99).count();
-    both = common.eigenvectors().rightCols(rank);
-    LogAgreement result;
-    result.log = name;
-    result.mean = robot_.ToPhysical(own.mode);
-    const Eigen::VectorXd own_sd = own.posterior.covariance.diagonal().cwiseSqrt();
-    result.sd =
-        (robot_.ToPhysical(own.mode + own_sd) - robot_.ToPhysical(own.mode - own_sd)).cwiseAbs() /
-        2;
-    if (rank == 0) {
-      result.distance = 0, result.p = 1;
-      return result;
-    }
-    const Eigen::VectorXd offset =
-        both.transpose() * ((LikelihoodMode(own) - their_mode).cwiseQuotient(sd));
-    const Eigen::MatrixXd spread = both.transpose() * (pseudo(mine) + pseudo(theirs)) * both;
-    const double squared = offset.dot(spread.llt().solve(offset));
-    result.distance = std::sqrt(squared);
-    result.p = std::min(
-        1.0, ChiSquaredTail(static_cast<double>(rank), squared) * static_cast<double>(fits.size()));
-    return result;
-  }
-
-  Eigen::VectorXd prior_sd() const { return findings_.prior.covariance.diagonal().cwiseSqrt(); }
-  static Eigen::MatrixXd Projector(const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>& eigen) {
-    const Eigen::Index rank = (eigen.eigenvalues().array() > 1).count();
-    const auto v = eigen.eigenvectors().rightCols(rank);
-    return v * v.transpose();
-  }
-  // The likelihood alone: the posterior without the prior.
-  Eigen::MatrixXd Data(const LaplaceFit& fit) const {
-    return Precision(fit.posterior) -
-           Eigen::MatrixXd(findings_.prior.covariance.diagonal().cwiseInverse().asDiagonal());
-  }
-  // Data * mode + prior * prior mean = posterior precision * posterior mode.
-  Eigen::VectorXd LikelihoodMode(const LaplaceFit& fit) const {
-    const Eigen::VectorXd sd = prior_sd();
-    const Eigen::VectorXd right =
-        Precision(fit.posterior) * fit.mode - findings_.prior.mean.cwiseQuotient(sd.cwiseAbs2());
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
-        Eigen::MatrixXd(sd.asDiagonal() * Data(fit) * sd.asDiagonal()));
-    const Eigen::ArrayXd values = eigen.eigenvalues().array();
-    // as in Against
-    const Eigen::VectorXd inverse = (values > 1).select(1 / values.max(1e-300), 0.0);
-    return sd.asDiagonal() *
-           (eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose()) *
-           sd.asDiagonal() * right;
+    agreement = plumb::CompareLogs(robot_, findings_.prior, fits);
   }
 
   const RobotDescription& robot_;

@@ -8,6 +8,7 @@
 
 #include "calibrator/diagnostics/holdout.h"
 #include "calibrator/diagnostics/identifiability.h"
+#include "calibrator/diagnostics/log_agreement.h"
 #include "calibrator/diagnostics/misspecification.h"
 #include "calibrator/fit/curriculum.h"
 #include "calibrator/fit/window_errors.h"
@@ -15,21 +16,6 @@
 #include "common/gaussian.h"
 
 namespace plumb {
-
-/// One log's own answer against that of all.
-struct LogAgreement {
-  std::string log;
-  Eigen::VectorXd mean, sd;  ///< of its own posterior, physical units
-  double distance;           ///< Mahalanobis' from the others' together, in what the log can tell
-  /// of such a distance if all logs were of one robot, corrected for the number of logs
-  double p;
-};
-
-struct Agreement {
-  bool agree = true;
-  std::vector<LogAgreement> logs;  ///< empty for a single log
-  std::string summary;
-};
 
 /// The update of the loop that findings come from.
 struct LoopUpdate {

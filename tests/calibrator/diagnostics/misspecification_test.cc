@@ -11,8 +11,8 @@
 
 #include "calibrator/diagnostics/error_tests.h"
 #include "calibrator/diagnostics/projected_errors.h"
-#include "calibrator/motion/touch.h"
 #include "common/gaussian.h"
+#include "sim/touch.h"
 #include "tests/calibrator/fitted_log.h"
 
 namespace plumb {
@@ -145,7 +145,8 @@ class Spoilt {
       const Transition& t = log.rollouts[static_cast<size_t>(row.rollout)]
                                 .transitions[static_cast<size_t>(row.transition)];
       double& error = log.residuals.errors(static_cast<Eigen::Index>(i));
-      error = spoil(error, row.coordinate, row.window, FindTouch(log.known, t).any(), random);
+      error = spoil(error, row.coordinate, row.window,
+                    TouchFinder(log.known).OfStep(t.q, t.next_q).any(), random);
     }
     return log.Find();
   }
@@ -263,18 +264,18 @@ TEST_CASE("what a robot touches") {
   Eigen::VectorXd q = Eigen::VectorXd::Zero(6);
   q.tail(3) << -0.1, -0.1, 0.1;
   q(1) = 1.25;
-  CHECK_FALSE(FindTouch(hopper, q).any());
+  CHECK_FALSE(TouchFinder(hopper).Find(q).any());
   q(1) = 1.15;
-  CHECK(FindTouch(hopper, q).ground);
-  CHECK_FALSE(FindTouch(hopper, q).stop);
+  CHECK(TouchFinder(hopper).Find(q).ground);
+  CHECK_FALSE(TouchFinder(hopper).Find(q).stop);
   q(1) = 2;
   q(4) = 0.01;
-  CHECK(FindTouch(hopper, q).stop);
-  CHECK_FALSE(FindTouch(hopper, q).ground);
+  CHECK(TouchFinder(hopper).Find(q).stop);
+  CHECK_FALSE(TouchFinder(hopper).Find(q).ground);
   RobotDescription blind = hopper;
   blind.simulation.stop.reset();
-  CHECK_FALSE(FindTouch(blind, q).any());
-  CHECK_THROWS_AS(FindTouch(hopper, q.head(5)), std::invalid_argument);
+  CHECK_FALSE(TouchFinder(blind).Find(q).any());
+  CHECK_THROWS_AS(TouchFinder(hopper).Find(q.head(5)), std::invalid_argument);
 }
 
 TEST_CASE("candidates are parameters of every robot's simulator, at the values that it has") {

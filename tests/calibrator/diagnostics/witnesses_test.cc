@@ -6,7 +6,7 @@
 
 #include "calibrator/diagnostics/model_test.h"
 #include "calibrator/fit/curriculum.h"
-#include "calibrator/motion/touch.h"
+#include "sim/touch.h"
 #include "tests/calibrator/fitted_log.h"
 
 namespace plumb {
@@ -73,8 +73,8 @@ TEST_CASE("a transition in which contact may begin within the noise is no witnes
   const RobotDescription known = Model(robot).Describe(Model(robot).parameters().means());
   for (int i = 0; i < 30; ++i) {
     const double middle = (touching + free) / 2;
-    (FindTouch(known, OneState(middle).rollouts[0].transitions[0].q).any() ? touching : free) =
-        middle;
+    (TouchFinder(known).Find(OneState(middle).rollouts[0].transitions[0].q).any() ? touching
+                                                                                  : free) = middle;
   }
   CHECK(OneState(free + 0.1).Count(1e-3) == 1);
   CHECK(OneState(free + 1e-3).Count(1e-3) == 0);
