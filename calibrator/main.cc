@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <iostream>
-#include <thread>
 
 #include "calibrator/live/calibrator.h"
 #include "calibrator/live/checkpoint.h"
@@ -18,6 +17,7 @@
 #include "common/name_lock.h"
 #include "common/process.h"
 #include "common/seed_range.h"
+#include "common/thread_count.h"
 #include "common/time_units.h"
 
 namespace plumb {
@@ -42,10 +42,7 @@ class Session {
         lock_(
             "calibration " + NameOfFile(flags.checkpoint),
             flags.checkpoint + ": another calibrator is at work there: give another --checkpoint"),
-        simopt_(robot, flags.seed,
-                flags.threads > 0
-                    ? flags.threads
-                    : static_cast<int>(std::max(1u, std::thread::hardware_concurrency())),
+        simopt_(robot, flags.seed, ThreadCount(flags.threads),
                 flags.method.empty() ? robot.calibration.method : flags.method),
         calibrator(robot, simopt_),
         checkpoint_(flags.checkpoint, robot, flags.seed) {

@@ -8,7 +8,6 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
-#include <thread>
 
 #include "calibrator/diagnostics/robot_sbc.h"
 #include "calibrator/report/report.h"
@@ -21,6 +20,7 @@
 #include "common/name_lock.h"
 #include "common/progress_line.h"
 #include "common/rank_batch_runner.h"
+#include "common/thread_count.h"
 #include "umbridge/remote_calibration.h"
 
 namespace plumb {
@@ -198,9 +198,7 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
   flags.options.residual = flags.options.residual && robot.calibration.residual;
   const std::vector<Log> logs = ReadLogs(flags.logs, flags.tables, robot);
   if (speaks) PrintLogs(logs);
-  const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  flags.options.execution.threads =
-      flags.threads > 0 ? flags.threads : std::max(1, cores / ranks.size());
+  flags.options.execution.threads = ThreadCount(flags.threads, ranks.OnThisMachine().size());
   ProgressLine line(speaks);
   const auto look = [&] {
     if (process.stopping()) throw Interrupted();

@@ -5,10 +5,10 @@
 
 #include <algorithm>
 #include <iostream>
-#include <thread>
 
 #include "cli/logs.h"
 #include "common/listen_address.h"
+#include "common/thread_count.h"
 #include "umbridge/robot_models.h"
 #include "umbridge/server.h"
 
@@ -20,8 +20,7 @@ int ServeModel(Process& process, const ServeModelFlags& flags) {
   for (const std::string& warning : robot.warnings) spdlog::warn(warning);
   const std::vector<Log> logs = ReadLogs(flags.logs, flags.tables, robot);
   PrintLogs(logs);
-  const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  RobotModels models(robot, logs, ExecutionOptions(flags.threads > 0 ? flags.threads : cores));
+  RobotModels models(robot, logs, ExecutionOptions(ThreadCount(flags.threads)));
   std::vector<std::string> names;
   for (const std::string& name : flags.hosts) names.push_back(HostAndPort::Split(name).host);
   UmbridgeServer server(listen, names, models.Models());

@@ -11,7 +11,6 @@
 #include <span>
 #include <sstream>
 #include <stdexcept>
-#include <thread>
 
 #include "cli/outputs.h"
 #include "cli/training_progress.h"
@@ -22,6 +21,7 @@
 #include "common/hash.h"
 #include "common/name_lock.h"
 #include "common/ranks.h"
+#include "common/thread_count.h"
 #include "robot/residual_json.h"
 #include "sim/simulators.h"
 #include "trainer/checkpoint.h"
@@ -79,7 +79,7 @@ class Training {
         robot_(ReadRobot(flags_)),
         distribution_(ReadDistribution(flags_.distribution, robot_)),
         trainer_(robot_.training, SimulateRobot(robot_), robot_.effort_limits(), flags_.seed,
-                 Threads(), ranks_) {
+                 ThreadCount(flags_.threads, ranks_.OnThisMachine().size()), ranks_) {
     if (!speaks()) spdlog::set_level(spdlog::level::err);
     try {
       RequireSendable(robot_);
@@ -153,11 +153,6 @@ class Training {
 
  private:
   bool speaks() const { return ranks_.rank() == 0; }
-
-  int Threads() const {
-    const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-    return flags_.threads > 0 ? flags_.threads : std::max(1, cores / ranks_.size());
-  }
 
   // All ranks stop after the same update, or the others would wait for ever.
   bool Stopping() {

@@ -60,7 +60,7 @@ def all_below(room, path=()):
 
 
 BELOW = {room: all_below(room) for room in STANDS_ON}
-# Of the virtual robot's room only the part on the bus knows drivers: it speaks the protocols' device side.
+# Of the virtual robot's room only the part on the bus knows drivers: it speaks the protocols' device side, and virtual_bus joins it with a driver.
 ON_THE_BUS = [f"sim/virtual/{file}" for file in
               ("virtual_bus.h", "virtual_bus.cc", "virtual_robot.h", "virtual_robot.cc", "virtual_devices.h",
                "virtual_drives.cc", "virtual_sensors.cc")]

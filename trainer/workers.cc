@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/shares.h"
+#include "common/thread_count.h"
 
 namespace plumb {
 namespace {
@@ -37,9 +38,7 @@ Role RoleIn(const Workers* workers) { return role.workers == workers ? role : Ro
 
 }  // namespace
 
-Workers::Workers(int threads)
-    : size_(threads > 0 ? threads
-                        : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()))) {
+Workers::Workers(int threads) : size_(ThreadCount(threads)) {
   for (Job& job : jobs_) job.claims = std::make_unique<Claims[]>(static_cast<size_t>(size_));
   for (int worker = 1; worker < size_; ++worker)
     threads_.emplace_back([this, worker] { Serve(worker); });

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "drivers/can/frame.h"
-#include "drivers/protocols/motor.h"
+#include "drivers/protocols/reason.h"
 #include "robot/buses.h"
 
 namespace plumb {

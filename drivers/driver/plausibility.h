@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "drivers/protocols/motor.h"
+#include "drivers/protocols/reason.h"
 #include "robot/description.h"
 
 namespace plumb {

@@ -6,7 +6,7 @@
 #include <functional>
 #include <string>
 
-#include "drivers/protocols/motor.h"
+#include "drivers/protocols/reason.h"
 
 namespace plumb {
 

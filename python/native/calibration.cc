@@ -8,10 +8,10 @@
 #include <ctime>
 #include <limits>
 #include <optional>
-#include <thread>
 
 #include "calibrator/results/posterior_file.h"
 #include "calibrator/results/summary.h"
+#include "common/thread_count.h"
 #include "python/native/arrays.h"
 #include "python/native/distribution.h"
 #include "python/native/motion.h"
@@ -100,8 +100,7 @@ Calibration Run(std::shared_ptr<Robot> robot, const py::object& motions, const s
   options.horizons = horizons;
   options.budget = InRange("budget", budget, kLeastBudget, kMostBudget);
   options.residual = residual && description.calibration.residual;
-  const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  options.execution.threads = Threads(threads) > 0 ? threads : cores;
+  options.execution.threads = ThreadCount(Threads(threads));
   options.progress = [&](const std::string& what, double share) {
     const py::gil_scoped_acquire acquired;
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
