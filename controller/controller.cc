@@ -45,6 +45,7 @@ Controller::Controller(const RobotDescription& robot, uint64_t seed, double rest
       space_(robot_),
       placement_(robot_),
       task_(MakeTask(robot_)),
+      driven_(robot_.driven()),
       seed_(seed),
       rest_(rest),
       most_steps_(robot.task.steps),
@@ -285,10 +286,8 @@ std::optional<joint_command_t> Controller::Act(const robot_state_t& state, int64
   joint_command_t command = ZeroCommand(utime);
   command.episode = episode_;
   command.step = status_.step;
-  const std::vector<int> driven = robot_.driven();
-  for (size_t i = 0; i < driven.size(); ++i) {
-    command.effort[static_cast<size_t>(driven[i])] = effort_[task_->action_indices()[i]];
-  }
+  for (size_t i = 0; i < driven_.size(); ++i)
+    command.effort[static_cast<size_t>(driven_[i])] = effort_[task_->action_indices()[i]];
   step_q_ = q;
   step_v_ = v;
   ++status_.step;

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "controller/policy.h"
 #include "controller/trial.h"
@@ -83,6 +84,7 @@ class Controller {
   ConfigurationSpace space_;
   Placement placement_;
   std::unique_ptr<Task> task_;
+  std::vector<int> driven_;  // joints
   uint64_t seed_;
   double rest_;
   Decide decide_;       // empty: the policy does

@@ -57,13 +57,15 @@ JointMeasurement JointSensor::OfEncoder(const EncoderReading& reading) const noe
           std::numeric_limits<double>::quiet_NaN()};
 }
 
+Eigen::Quaterniond JointSensor::LinkOrientation(const ImuSample& sample) const noexcept {
+  const auto& [w, x, y, z] = sample.orientation;
+  return Eigen::Quaterniond(w, x, y, z) * Eigen::Quaterniond(to_link_).conjugate();
+}
+
 JointMeasurement JointSensor::OfImu(const ImuSample& sample) noexcept {
   JointMeasurement measurement = newest_;
   if (joint_ < 0 || !sample.orientation_valid) return measurement;
-  const auto& [w, x, y, z] = sample.orientation;
-  const Eigen::Quaterniond link =
-      Eigen::Quaterniond(w, x, y, z) * Eigen::Quaterniond(to_link_).conjugate();
-  const double twist = mounting_.Angle(link);
+  const double twist = mounting_.Angle(LinkOrientation(sample));
   // The one of the angles that look like this which is next to the last.
   const double near = std::isfinite(newest_.position) && turns_counted_ ? newest_.position : 0;
   turns_counted_ = true;
@@ -101,9 +103,7 @@ const imu_t* JointSensor::NextImu() noexcept {
   message_.utime = imu_samples_.time();
   Eigen::Map<Eigen::Vector3d>(message_.rate) = to_link_ * Vector(sample.rate);
   Eigen::Map<Eigen::Vector3d>(message_.force) = to_link_ * Vector(sample.force);
-  const auto& [w, x, y, z] = sample.orientation;
-  const Eigen::Quaterniond link =
-      Eigen::Quaterniond(w, x, y, z) * Eigen::Quaterniond(to_link_).conjugate();
+  const Eigen::Quaterniond link = LinkOrientation(sample);
   message_.orientation[0] = link.w();
   message_.orientation[1] = link.x();
   message_.orientation[2] = link.y();

@@ -69,6 +69,7 @@ class JointSensor {
  private:
   JointMeasurement OfEncoder(const EncoderReading& reading) const noexcept;
   JointMeasurement OfImu(const ImuSample& sample) noexcept;
+  Eigen::Quaterniond LinkOrientation(const ImuSample& sample) const noexcept;
 
   std::string name_;
   size_t bus_;
