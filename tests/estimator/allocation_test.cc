@@ -10,7 +10,7 @@ namespace plumb {
 namespace {
 
 TEST_CASE("a thousand steps with noise, outages, lies, restarts and rubbish allocate nothing") {
-  RobotDescription robot;
+  RobotDescription robot{};
   robot.joints.resize(3);
   for (JointDescription& joint : robot.joints) joint.effort_limit = 2;
   robot.estimator = {.position_sd = 1.2e-4,

@@ -22,7 +22,7 @@ constexpr int64_t kImpactPeriod = 2000, kSubstep = 20;  // [us]
 
 /// Falls onto its stop at zero, again and again.
 RobotDescription Hammer() {
-  RobotDescription robot;
+  RobotDescription robot{};
   robot.joints.resize(1);
   robot.joints[0].name = "pivot";
   robot.joints[0].upper = 10;
@@ -159,7 +159,7 @@ TEST_CASE("a speed counts from shortly before the impact until it rests") {
 
 // Two joints, one of which an effort acts upon, or its stop.
 std::vector<double> VelocitySds(double coupling, bool effort, bool stop) {
-  RobotDescription robot;
+  RobotDescription robot{};
   robot.joints.resize(2);
   for (JointDescription& joint : robot.joints)
     joint.effort_limit = 2, joint.lower = -1, joint.upper = 1;

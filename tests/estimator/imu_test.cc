@@ -13,7 +13,7 @@ namespace {
 
 RobotDescription Torso() {
   using Type = JointDescription::Type;
-  RobotDescription robot;
+  RobotDescription robot{};
   robot.links.resize(4);
   const auto add = [&](const char* name, Type type, Eigen::Vector3d axis, int parent) {
     JointDescription joint;
@@ -127,7 +127,7 @@ struct Rig {
     return {(e.q / n).cwiseSqrt(), (e.v / n).cwiseSqrt(), e.nees / n};
   }
 
-  RobotDescription robot;
+  RobotDescription robot{};
   StateObserver observer;
   Random random{9, {2}};
   double gyro_bias = 0, angle = 0, rate = 0;

@@ -9,7 +9,7 @@ namespace plumb {
 namespace {
 
 RobotDescription TunedRobot() {
-  RobotDescription robot;
+  RobotDescription robot{};
   robot.joints.resize(1);
   robot.joints[0].name = "pivot";
   robot.joints[0].effort_limit = 2;

@@ -13,7 +13,7 @@ namespace {
 constexpr int64_t kPeriod = 5000;  // [us]
 
 RobotDescription RobotOf(int joints) {
-  RobotDescription robot;
+  RobotDescription robot{};
   robot.joints.resize(static_cast<size_t>(joints));
   for (JointDescription& joint : robot.joints) joint.effort_limit = 2;
   robot.joints[0].name = "first";

@@ -8,7 +8,7 @@ namespace plumb {
 namespace {
 
 RobotDescription Robot() {
-  RobotDescription robot;
+  RobotDescription robot{};
   robot.joints.resize(1);
   robot.joints[0].effort_limit = 2;
   robot.estimator = {.position_sd = 1.2e-4,

@@ -9,7 +9,7 @@ namespace plumb {
 /// Two joints on ODrives, one of them behind a gear and turned round, and a slide on the boom that
 /// an encoder measures; short times, so that much happens in few cycles.
 inline RobotDescription Leg() {
-  RobotDescription robot;
+  RobotDescription robot{};
   robot.links.resize(4);
   for (size_t i = 0; i < 3; ++i) {
     JointDescription joint;

@@ -8,7 +8,7 @@ namespace plumb {
 namespace {
 
 RobotDescription Robot() {
-  RobotDescription robot;
+  RobotDescription robot{};
   robot.name = "test robot";
   robot.parameters = {{"gravity", "m/s^2", ParameterDescription::Coordinate::kLog, 10.4, .33},
                       {"offset", "rad", ParameterDescription::Coordinate::kLinear, -.2, .01}};

@@ -32,7 +32,7 @@ Residual TwoDraws() {
 }
 
 RobotDescription OneParameter() {
-  RobotDescription robot;
+  RobotDescription robot{};
   robot.name = "one";
   ParameterDescription parameter{};
   parameter.name = "gravity";

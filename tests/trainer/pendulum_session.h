@@ -12,7 +12,7 @@ namespace plumb {
 
 /// A pendulum whose training takes little: six updates, then two.
 inline RobotDescription PendulumRobot() {
-  RobotDescription robot;
+  RobotDescription robot{};
   robot.name = "test robot";
   const auto log = ParameterDescription::Coordinate::kLog;
   robot.parameters = {{"gravity", "m/s^2", log, 10, .3},

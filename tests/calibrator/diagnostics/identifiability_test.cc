@@ -29,7 +29,7 @@ Identifiability Find(const ParameterDescription& extra, const Eigen::VectorXd& t
 /// A robot of n parameters a0, a1, ... with logarithmic coordinates: only their description
 /// matters.
 RobotDescription WithSomeParameters(int n) {
-  RobotDescription robot;
+  RobotDescription robot{};
   for (int i = 0; i < n; ++i)
     robot.parameters.push_back({"a" + std::to_string(i), "", Coordinate::kLog, 1, 0.01});
   return robot;

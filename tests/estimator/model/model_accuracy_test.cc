@@ -20,7 +20,7 @@ struct Motion {
     return assumed;
   }
 
-  RobotDescription robot;
+  RobotDescription robot{};
   Recordings recordings;
 };
 
