@@ -13,29 +13,23 @@
 #include <stdexcept>
 #include <utility>
 
+#include "calibrator/live/json_values.h"
+#include "calibrator/live/rollout_json.h"
 #include "common/atomic_file.h"
 #include "common/checked_file.h"
-#include "robot/configuration_space.h"
 #include "robot/json_text.h"
 #include "robot/parameter_distribution.h"
-#include "robot/physical.h"
 
 namespace plumb {
 namespace {
 
 using nlohmann::json;
+using plumb::ToJson;  // of vectors and roll-outs, beside those below
 
 // Version 2: without the method used, its warnings and a search's samples; 3: without a residual; 4
 // to 6: with another; 7: without a checksum; 8: without the number of roll-outs that are forgotten;
 // 9: without information
 constexpr FileKind kKind{"PLUMBCAL", 10, "a calibrator's checkpoint"};
-
-json ToJson(const Eigen::VectorXd& x) { return std::vector<double>(x.begin(), x.end()); }
-
-Eigen::VectorXd VectorFrom(const json& j) {
-  const auto values = j.get<std::vector<double>>();
-  return Eigen::VectorXd::Map(values.data(), static_cast<Eigen::Index>(values.size()));
-}
 
 Informed InformedFrom(const std::string& name) {
   for (const Informed informed : kAllInformed) {
@@ -60,11 +54,6 @@ Gaussian GaussianFrom(const json& j) {
   p.covariance = Eigen::MatrixXd::Map(values.data(), n, n);
   LogDensity(p, p.mean);  // throws unless it is positive definite
   return p;
-}
-
-// JSON has no NaN.
-double NumberOrNaN(const json& j) {
-  return j.is_null() ? std::numeric_limits<double>::quiet_NaN() : j.get<double>();
 }
 
 // @param n parameters.
@@ -100,17 +89,6 @@ GaussianMixture MixtureFrom(const json& j) {
   return mixture;
 }
 
-// A number with a fraction, or a greater one, would become one that nobody wrote.
-template <class Int = int>
-Int Whole(const json& j) {
-  const bool fits = j.is_number_unsigned()
-                        ? std::in_range<Int>(j.get<uint64_t>())
-                        : j.is_number_integer() && std::in_range<Int>(j.get<int64_t>());
-  if (!fits)
-    throw std::runtime_error(fmt::format("{} is not a whole number, or too great", j.dump()));
-  return j.get<Int>();
-}
-
 std::vector<int> WholeNumbers(const json& j) {
   std::vector<int> numbers;
   for (const json& number : j) numbers.push_back(Whole(number));
@@ -138,70 +116,6 @@ void ReadSamples(const json& j, RepsState* search) {
     const json& density = densities[static_cast<size_t>(i)];
     search->densities(i) =
         density.is_null() ? -std::numeric_limits<double>::infinity() : density.get<double>();
-  }
-}
-
-const std::vector<std::pair<const char*, Eigen::VectorXd Transition::*>> kVectors{
-    {"q", &Transition::q},
-    {"v", &Transition::v},
-    {"next_q", &Transition::next_q},
-    {"next_v", &Transition::next_v},
-    {"q_sd", &Transition::q_sd},
-    {"v_sd", &Transition::v_sd},
-    {"next_q_sd", &Transition::next_q_sd},
-    {"next_v_sd", &Transition::next_v_sd}};
-
-json ToJson(const Rollout& rollout) {
-  json transitions = json::array();
-  for (const Transition& t : rollout.transitions) {
-    json entry{{"step", t.step}};
-    for (const auto& [name, member] : kVectors) entry[name] = ToJson(t.*member);
-    json efforts = json::array();
-    for (const EffortSegment& e : t.efforts)
-      efforts.push_back({{"duration", e.duration}, {"effort", ToJson(e.effort)}});
-    entry["efforts"] = std::move(efforts);
-    transitions.push_back(std::move(entry));
-  }
-  return {{"episode", rollout.episode},
-          {"policy_iteration", rollout.policy_iteration},
-          {"transitions", std::move(transitions)}};
-}
-
-Rollout RolloutFrom(const json& j) {
-  Rollout rollout;
-  rollout.episode = Whole<int64_t>(j.at("episode"));
-  rollout.policy_iteration = Whole(j.at("policy_iteration"));
-  for (const json& entry : j.at("transitions")) {
-    Transition t;
-    t.step = Whole(entry.at("step"));
-    for (const auto& [name, member] : kVectors) t.*member = VectorFrom(entry.at(name));
-    for (const json& e : entry.at("efforts"))
-      t.efforts.push_back({e.at("duration"), VectorFrom(e.at("effort"))});
-    rollout.transitions.push_back(std::move(t));
-  }
-  return rollout;
-}
-
-void RequireTransitions(const Rollout& rollout, const RobotDescription& robot) {
-  const auto require = [](const Eigen::VectorXd& x, int size, bool (*good)(double)) {
-    if (x.size() != size || !std::all_of(x.begin(), x.end(), good))
-      throw std::runtime_error("a transition has the wrong size or is not physical");
-  };
-  const ConfigurationSpace space(robot);
-  const int positions = robot.num_positions(), velocities = robot.num_velocities();
-  for (const Transition& t : rollout.transitions) {
-    for (const Eigen::VectorXd* q : {&t.q, &t.next_q}) require(*q, positions, IsPhysical);
-    for (const Eigen::VectorXd* v : {&t.v, &t.next_v}) require(*v, velocities, IsPhysical);
-    for (const Eigen::VectorXd* sd : {&t.q_sd, &t.next_q_sd, &t.v_sd, &t.next_v_sd})
-      require(*sd, velocities, IsPhysicalSd);
-    for (const Eigen::VectorXd* q : {&t.q, &t.next_q}) {
-      if (const std::string fault = space.Fault(*q); !fault.empty())
-        throw std::runtime_error("a transition's q " + fault);
-    }
-    for (const EffortSegment& segment : t.efforts) {
-      require(segment.effort, velocities, IsPhysical);
-      if (!(segment.duration > 0)) throw std::runtime_error("an effort lasts no time");
-    }
   }
 }
 

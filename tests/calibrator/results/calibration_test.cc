@@ -6,43 +6,17 @@
 
 #include "calibrator/diagnostics/holdout.h"
 #include "common/decompositions.h"
-#include "common/special_numbers.h"
 #include "tests/calibrator/fitted_log.h"
 #include "tests/calibrator/hopper.h"
 #include "tests/calibrator/inference/statistics.h"
+#include "tests/calibrator/results/swinging.h"
 #include "tests/calibrator/synthetic.h"
 
 namespace plumb {
 namespace {
 
-const Eigen::Vector3d kTruth(9.5, 1.1, 0.95);
-
-Log Swinging(const std::string& name, const Eigen::VectorXd& truth, int rollouts, uint32_t stream,
-             int steps = 60) {
-  Log log;
-  log.name = name;
-  for (int i = 0; i < rollouts; ++i) {
-    log.rollouts.push_back(
-        SyntheticRollout(Pendulum(), truth, steps, 1e-3, 5e-3, stream + static_cast<uint32_t>(i)));
-    for (Transition& t : log.rollouts.back().transitions) {  // nobody says what the noise is
-      for (Eigen::VectorXd* sd : {&t.q_sd, &t.v_sd, &t.next_q_sd, &t.next_v_sd})
-        sd->setConstant(kNaN);
-    }
-  }
-  return log;
-}
-
-Findings Of(const std::vector<Log>& logs, const std::string& method = "auto",
-            int64_t budget = 20'000) {
-  CalibrationOptions options;
-  options.method = method;
-  options.budget = budget;
-  options.horizons = {1, 5};
-  return Calibrate(Pendulum(), logs, options);
-}
-
 TEST_CASE("a model is not judged by velocities that are differences of positions") {
-  std::vector<Log> logs{Swinging("a", kTruth, 3, 0)};
+  std::vector<Log> logs{Swinging("a", kSwingingTruth, 3, 0)};
   logs[0].differenced = {"pivot"};
   const Findings f = Of(logs, "laplace");
   CHECK_FALSE(f.misspecification.alarm);
@@ -56,7 +30,7 @@ TEST_CASE("a model is not judged by velocities that are differences of positions
 }
 
 TEST_CASE("a pendulum's calibration finds what the motion tells, and names what it does not") {
-  const Findings f = Of({Swinging("a", kTruth, 6, 0)});
+  const Findings f = Of({Swinging("a", kSwingingTruth, 6, 0)});
   CHECK(f.used == "laplace");
   CHECK(f.transitions == 360);
   // gravity / length and mass length^2 to a few standard deviations, both well known.
@@ -65,8 +39,8 @@ TEST_CASE("a pendulum's calibration finds what the motion tells, and names what 
   for (const Eigen::Vector3d& known : {slow, heavy}) {
     const double sd = std::sqrt(known.dot(posterior.covariance * known));
     CHECK(sd < 0.02);
-    CHECK(std::abs(known.dot(posterior.mean) - known.dot(Eigen::Vector3d(kTruth.array().log()))) <
-          4 * sd);
+    CHECK(std::abs(known.dot(posterior.mean) -
+                   known.dot(Eigen::Vector3d(kSwingingTruth.array().log()))) < 4 * sd);
   }
   REQUIRE(f.identifiability.null.size() == 1);
   CHECK((f.identifiability.null[0].normalized().cwiseAbs() - null.normalized().cwiseAbs()).norm() <
@@ -148,7 +122,7 @@ TEST_CASE("parameters that nothing informs are not determined, and what is lacki
 }
 
 TEST_CASE("noise alone raises the alarm, and teaches hardly anything") {
-  Log log = Swinging("noise", kTruth, 6, 20);
+  Log log = Swinging("noise", kSwingingTruth, 6, 20);
   Random random(3);
   for (Rollout& rollout : log.rollouts) {
     for (Transition& t : rollout.transitions) {
@@ -164,53 +138,8 @@ TEST_CASE("noise alone raises the alarm, and teaches hardly anything") {
   CHECK(f.noise_sd(0) == Approx(6 / std::sqrt(12)).epsilon(0.5));
 }
 
-TEST_CASE("logs of one robot agree, logs of two do not") {
-  const Log a = Swinging("a", kTruth, 3, 30), b = Swinging("b", kTruth, 3, 40);
-  const Log other = Swinging("other", Eigen::Vector3d(9.5, 1.15, 0.95), 3, 50);
-  const Findings same = Of({a, b});
-  CHECK(same.agreement.agree);
-  REQUIRE(same.agreement.logs.size() == 2);
-  CHECK(same.agreement.logs[0].log == "a");
-  // of two, each is the other's judge
-  CHECK(same.agreement.logs[0].p == Approx(same.agreement.logs[1].p));
-  const Findings odd = Of({a, b, other});
-  CHECK_FALSE(odd.agreement.agree);
-  REQUIRE(odd.agreement.logs.size() == 3);
-  CHECK(odd.agreement.logs[2].p < 1e-3);
-  CHECK(odd.agreement.logs[2].distance > odd.agreement.logs[0].distance);
-  CHECK(odd.agreement.summary.find("other") != std::string::npos);
-}
-
-TEST_CASE("logs of one robot seldom disagree by chance") {
-  int p_below = 0;
-  constexpr int kPairs = 40;
-  RobotDescription robot = Pendulum();
-  robot.task.steps = 10;  // of the motion that would be advised, which is not the matter here
-  for (uint32_t i = 0; i < kPairs; ++i) {
-    CalibrationOptions options;
-    options.method = "laplace";
-    options.horizons = {1};
-    const std::vector<Log> logs{Swinging("a", kTruth, 2, 1000 + 10 * i, 30),
-                                Swinging("b", kTruth, 2, 1005 + 10 * i, 30)};
-    // which is 0.1, for two logs
-    p_below += Calibrate(robot, logs, options).agreement.logs[0].p < 0.2;
-  }
-  CHECK(p_below <= 11);  // of 4 expected
-}
-
-TEST_CASE("a log that cannot be fitted on its own is named, and leaves nothing to compare with") {
-  const Log a = Swinging("a", kTruth, 3, 30);
-  const Log tiny = Swinging("tiny", kTruth, 1, 60, 1);
-  const Findings f = Of({a, tiny});
-  REQUIRE_FALSE(f.warnings.empty());
-  CHECK(std::any_of(f.warnings.begin(), f.warnings.end(),
-                    [](const auto& w) { return w.find("tiny") != std::string::npos; }));
-  CHECK(f.agreement.summary.find("the 1 logs") == std::string::npos);
-  CHECK(f.agreement.agree);
-}
-
 TEST_CASE("an unknown method is an error that names the nearest") {
-  const std::vector<Log> logs{Swinging("a", kTruth, 1, 0)};
+  const std::vector<Log> logs{Swinging("a", kSwingingTruth, 1, 0)};
   CHECK_THROWS_WITH(Of(logs, "laplas"),
                     Catch::Contains("'laplas'") && Catch::Contains("'laplace'"));
   CHECK_THROWS_AS(Of(logs, "laplas"), std::invalid_argument);
@@ -220,10 +149,10 @@ TEST_CASE("what is no data, or hardly any, is refused or believed as little as i
   CHECK_THROWS_AS(Of({}), std::invalid_argument);
   CHECK_THROWS_AS(Of({Log{}}), std::invalid_argument);
   SECTION("one transition") {
-    CHECK_THROWS_WITH(Of({Swinging("a", kTruth, 1, 0, 1)}), Catch::Contains("too few"));
+    CHECK_THROWS_WITH(Of({Swinging("a", kSwingingTruth, 1, 0, 1)}), Catch::Contains("too few"));
   }
   SECTION("one transition whose noise is known") {
-    Log log = Swinging("a", kTruth, 1, 0, 1);
+    Log log = Swinging("a", kSwingingTruth, 1, 0, 1);
     for (Transition& t : log.rollouts[0].transitions) {
       t.q_sd = t.next_q_sd = Eigen::VectorXd::Constant(1, 1e-3);
       t.v_sd = t.next_v_sd = Eigen::VectorXd::Constant(1, 5e-3);
@@ -233,13 +162,13 @@ TEST_CASE("what is no data, or hardly any, is refused or believed as little as i
     const Gaussian posterior = Moments(f.posterior);
     CHECK((posterior.covariance.diagonal().array() <= 1.001 * f.prior.covariance.diagonal().array())
               .all());
-    CHECK(((posterior.mean - Eigen::Vector3d(kTruth.array().log())).array().abs() <
+    CHECK(((posterior.mean - Eigen::Vector3d(kSwingingTruth.array().log())).array().abs() <
            4 * posterior.covariance.diagonal().array().sqrt())
               .all());
     CHECK(f.noise_sd(0) == Approx(1e-3).epsilon(0.3));
   }
   SECTION("a pendulum at rest tells nothing but that it hangs") {
-    Log log = Swinging("rest", kTruth, 2, 0);
+    Log log = Swinging("rest", kSwingingTruth, 2, 0);
     for (Rollout& rollout : log.rollouts) {
       for (Transition& t : rollout.transitions) {
         for (Eigen::VectorXd* x : {&t.q, &t.v, &t.next_q, &t.next_v}) x->setConstant(0);
@@ -260,7 +189,7 @@ TEST_CASE("noise that the record knows is what is reported") {
   Log log;
   log.name = "known";
   for (uint32_t i = 0; i < 5; ++i)
-    log.rollouts.push_back(SyntheticRollout(Pendulum(), kTruth, 40, 2e-3, 8e-3, 70 + i));
+    log.rollouts.push_back(SyntheticRollout(Pendulum(), kSwingingTruth, 40, 2e-3, 8e-3, 70 + i));
   for (const char* method : {"laplace", "reps"}) {
     const Findings f = Of({log}, method, 400'000);
     CAPTURE(method);
@@ -274,14 +203,14 @@ TEST_CASE("noise that the record knows is what is reported") {
     for (Transition& t : rollout.transitions) t.next_v.array() += 0.1 * std::sin(3.0 * t.step);
   }
   CHECK(Of({log}, "laplace").discrepancy > 20);
-  CHECK(std::isnan(Of({Swinging("nobody says", kTruth, 3, 0)}, "laplace").discrepancy));
+  CHECK(std::isnan(Of({Swinging("nobody says", kSwingingTruth, 3, 0)}, "laplace").discrepancy));
 }
 
 TEST_CASE("each method runs and comes near") {
-  const std::vector<Log> logs{Swinging("a", kTruth, 2, 80, 30)};
+  const std::vector<Log> logs{Swinging("a", kSwingingTruth, 2, 80, 30)};
   const Findings laplace = Of(logs, "laplace");
   const Eigen::Vector3d heavy(0, 1, 2);
-  const double truth = heavy.dot(Eigen::Vector3d(kTruth.array().log()));
+  const double truth = heavy.dot(Eigen::Vector3d(kSwingingTruth.array().log()));
   for (const std::string& method : CalibrationMethods()) {
     CAPTURE(method);
     const Findings f = Of(logs, method, 100'000);
@@ -301,7 +230,7 @@ TEST_CASE("each method runs and comes near") {
 }
 
 TEST_CASE("the same bits with any number of threads and a journal or none") {
-  const std::vector<Log> logs{Swinging("a", kTruth, 2, 90, 30)};
+  const std::vector<Log> logs{Swinging("a", kSwingingTruth, 2, 90, 30)};
   for (const char* method : {"auto", "mixture", "reps", "simopt"}) {
     CalibrationOptions options;
     options.method = method, options.budget = 20'000, options.horizons = {1, 5};
@@ -319,7 +248,7 @@ TEST_CASE("simulations that fail over a part of the prior do not spoil the rest"
   RobotDescription robot = Pendulum();
   robot.parameters[1].coordinate = ParameterDescription::Coordinate::kLinear;
   robot.parameters[1].variance = 4;
-  const std::vector<Log> logs{Swinging("a", kTruth, 4, 95)};
+  const std::vector<Log> logs{Swinging("a", kSwingingTruth, 4, 95)};
   for (const char* method : {"laplace", "reps"}) {
     CAPTURE(method);
     CalibrationOptions options;
@@ -331,13 +260,13 @@ TEST_CASE("simulations that fail over a part of the prior do not spoil the rest"
 }
 
 TEST_CASE("hold-out keeps every fifth roll-out back, or the last fifth of each") {
-  const Log five = Swinging("a", kTruth, 11, 0, 7);
+  const Log five = Swinging("a", kSwingingTruth, 11, 0, 7);
   const Split whole = HoldOut(five.rollouts);
   REQUIRE(whole.held_out.size() == 2);
   CHECK(whole.held_out[0].episode == 4);
   CHECK(whole.held_out[1].episode == 9);
   CHECK(whole.fitted.size() == 9);
-  const Log few = Swinging("a", kTruth, 4, 0, 13);
+  const Log few = Swinging("a", kSwingingTruth, 4, 0, 13);
   const Split parts = HoldOut(few.rollouts);
   REQUIRE(parts.held_out.size() == 4);
   for (const Rollout& rollout : parts.held_out) {
@@ -345,7 +274,7 @@ TEST_CASE("hold-out keeps every fifth roll-out back, or the last fifth of each")
     CHECK(rollout.transitions[0].step == 11);
   }
   for (const Rollout& rollout : parts.fitted) CHECK(rollout.transitions.size() == 11);
-  const Log hardly = Swinging("a", kTruth, 1, 0, 9);
+  const Log hardly = Swinging("a", kSwingingTruth, 1, 0, 9);
   CHECK(HoldOut(hardly.rollouts).held_out.empty());
   CHECK(HoldOut(hardly.rollouts).fitted.size() == 1);
 }
