@@ -6,11 +6,13 @@
 
 #include <algorithm>
 #include <ctime>
+#include <utility>
 #include <vector>
 
 #include "calibrator/fit/curriculum.h"
 #include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/fit/streaming.h"
+#include "common/median.h"
 #include "tests/calibrator/hopper.h"
 
 namespace plumb {
@@ -62,10 +64,7 @@ void StreamingTransition(benchmark::State& state) {
   }
   // The same work each time: what differs is the machine.
   std::vector<double> seconds;
-  for (std::vector<double>& repeat : repeats) {
-    std::sort(repeat.begin(), repeat.end());
-    seconds.push_back(repeat[repeat.size() / 2]);
-  }
+  for (std::vector<double>& repeat : repeats) seconds.push_back(Median(std::move(repeat)));
   std::sort(seconds.begin(), seconds.end());
   const auto quantile = [&](double share) {
     return 1e6 * seconds[static_cast<size_t>(share * static_cast<double>(seconds.size() - 1))];

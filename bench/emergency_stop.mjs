@@ -5,12 +5,11 @@
 import { spawn } from "node:child_process";
 import { createRequire } from "node:module";
 import { createInterface } from "node:readline";
-import { build, launch, look, stall } from "../tests/dashboard/browser.mjs";
+import { build, launch, look, source, stall } from "../tests/dashboard/browser.mjs";
 
 const WebSocket = createRequire(new URL("../dashboard/web/package.json", import.meta.url))("ws");
 const times = Number(process.argv[2] ?? 30);
-const here = (name) => new URL(name, import.meta.url).pathname;
-const robot = here("../robots/pendulum");
+const robot = `${source}/robots/pendulum`;
 const ARMED = 3; // of driver_status_t
 
 const processes = [];
@@ -51,7 +50,7 @@ async function connect(address) {
   return { call, until, close: () => socket.terminate() };
 }
 
-const speaker = start(here("dashboard"), "--speak");
+const speaker = start(`${source}/bench/dashboard`, "--speak");
 const url = await firstLine(speaker, /udpm:\S+/);
 const bus = ["--bus", `udp:239.74.163.61:${/:(\d+)\?/.exec(url)[1]}`, "--lcm-url", url];
 start(`${build}/bin/plumb-robot`, robot, ...bus);

@@ -5,11 +5,11 @@
 import { spawn } from "node:child_process";
 import { mkdtempSync, rmSync } from "node:fs";
 import { createServer } from "node:http";
-import { build, launch, look } from "../tests/dashboard/browser.mjs";
+import { build, launch, look, source } from "../tests/dashboard/browser.mjs";
 
 const times = Number(process.argv[2] ?? 10);
 const folder = mkdtempSync("/tmp/first_paint_");
-const robot = new URL("../robots/pendulum", import.meta.url).pathname;
+const robot = `${source}/robots/pendulum`;
 const run = spawn(`${build}/bin/plumb`, ["launch", robot, "--dashboard", "127.0.0.1:0", "--real-time", "--iterations", "1000", "--output", folder], { stdio: ["ignore", "pipe", "pipe"] });
 const address = await new Promise((resolve) => {
   let said = "";

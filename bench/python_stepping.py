@@ -22,7 +22,7 @@ except ImportError:
     mujoco = None
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-BUILD = pathlib.Path(os.environ.get("PLUMBLINE_BUILD", ROOT / "build"))
+BUILD = ROOT / os.environ.get("PLUMBLINE_BUILD", "build")
 COUNTS = 16, 128, 1024, 8192
 SIMULATED = 400_000  # control steps of a turn
 LONGEST = 100  # control steps from one reset to the next

@@ -48,7 +48,11 @@ class Session {
         checkpoint_(flags.checkpoint, robot, flags.seed) {
     // A run in virtual time begins anew, and comes to the same: its roll-outs are what they were.
     if (auto state = checkpoint_.Load(); state && !anew) {
-      simopt_.Resume(std::move(*state));
+      try {
+        simopt_.Resume(std::move(*state));
+      } catch (const std::invalid_argument& error) {
+        throw std::invalid_argument(fmt::format("{}: {}", flags.checkpoint, error.what()));
+      }
       spdlog::info("resumed after iteration {}, update {}", simopt_.state().iteration,
                    simopt_.state().search.update);
       report_ = simopt_.Report();

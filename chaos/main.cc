@@ -13,6 +13,7 @@
 
 #include "chaos/trial.h"
 #include "common/examples.h"
+#include "common/process.h"
 
 namespace plumb {
 namespace {
@@ -64,6 +65,19 @@ Range ParseSeeds(const std::string& text) {
   return range;
 }
 
+/// @throws std::invalid_argument if one of these seeds has been played there already.
+void RequireNew(const fs::path& keep, const Range& seeds) {
+  std::error_code ignored;  // there may be no such folder yet
+  for (const fs::directory_entry& kept : fs::directory_iterator(keep, ignored)) {
+    const std::string name = kept.path().filename();
+    uint64_t seed = 0;
+    const auto read = std::from_chars(name.data(), name.data() + name.size(), seed);
+    const bool played = read.ec == std::errc() && seed >= seeds.first && seed <= seeds.last;
+    if (const fs::path robot = kept.path() / "robot"; played && fs::exists(robot))
+      throw std::invalid_argument(robot.string() + " is there already: give another --keep");
+  }
+}
+
 std::string Row(uint64_t seed, const Outcome& outcome) {
   return fmt::format("{:6} {:7} {:8} {:12} {:9} {:9} {:8.1f}  {:016x}  {}", seed, outcome.pranks,
                      outcome.endings, outcome.transitions, outcome.messages, outcome.frames,
@@ -71,8 +85,9 @@ std::string Row(uint64_t seed, const Outcome& outcome) {
                      outcome.invariant == 0 ? "-" : std::to_string(outcome.invariant));
 }
 
-int Run(const Flags& flags) {
+int PlayAll(const Flags& flags) {
   const Range seeds = ParseSeeds(flags.seeds);
+  if (!flags.keep.empty()) RequireNew(flags.keep, seeds);
   std::cout << "  seed  pranks  endings  transitions  messages    frames  seconds  fingerprint"
                "       violates\n"
             << std::flush;
@@ -134,10 +149,15 @@ int main(int argc, char** argv) {
   app.add_option("--keep", flags.keep, "a folder to leave each seed's logs and checkpoints in");
   plumb::AddExamples(app, {"plumb-chaos robots/pendulum --seed 7 --verbose",
                            "plumb-chaos robots/pendulum --seeds 1:200 --first"});
-  CLI11_PARSE(app, argc, argv);
+  app.set_version_flag("--version", plumb::VersionLine("plumb-chaos"));
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
   spdlog::set_level(spdlog::level::off);  // whom we do not believe is part of the game
   try {
-    return plumb::Run(flags);
+    return plumb::PlayAll(flags);
   } catch (const std::exception& error) {
     std::cerr << "plumb-chaos: " << error.what() << std::endl;
     return 2;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <span>
 
+#include "chaos/decoded.h"
 #include "common/seal.h"
 #include "plumb/calibration_status_t.hpp"
 #include "plumb/controller_status_t.hpp"
@@ -81,14 +82,6 @@ bool IsFinite(const controller_status_t& m) {
   return Finite(m.returns, m.late_rate) && std::isfinite(m.episode_return);
 }
 
-/// Decodes it, if it is of that type.
-template <class Message>
-bool Read(const lockstep_post_t& post, Message& message) {
-  const std::span<const uint8_t> bytes = Unsealed(post.data);
-  const int size = static_cast<int>(bytes.size());
-  return message.decode(bytes.data(), 0, size) == size;
-}
-
 constexpr const char* kDriverStates[] = {"ABSENT", "IDLE", "ARMING", "ARMED", "FAULT"};
 constexpr const char* kPhases[] = {"WAITING", "PLACING", "RUNNING", "COMPLETE", "HALTED"};
 
@@ -122,56 +115,57 @@ void MessageWitness::OnSaid(int64_t time, const lockstep_post_t& post, const std
   if (post.topic.kind == lockstep_topic_t::FRAME || speaker.empty()) return;
   const std::string& channel = post.topic.name;
   if (channel == "JOINT_STATE") {
-    if (joint_state_t m; Read(post, m)) RequireFinite(time, channel, m);
+    if (const auto m = Decoded<joint_state_t>(post)) RequireFinite(time, channel, *m);
   } else if (channel == "ROBOT_STATE" || channel == "ROBOT_STATE_SMOOTHED") {
-    if (robot_state_t m; Read(post, m)) RequireFinite(time, channel, m);
+    if (const auto m = Decoded<robot_state_t>(post)) RequireFinite(time, channel, *m);
   } else if (channel == "IMU") {
-    if (imu_t m; Read(post, m)) RequireFinite(time, channel, m);
+    if (const auto m = Decoded<imu_t>(post)) RequireFinite(time, channel, *m);
   } else if (channel == "JOINT_COMMAND") {
-    if (joint_command_t m; Read(post, m)) RequireFinite(time, channel, m);
+    if (const auto m = Decoded<joint_command_t>(post)) RequireFinite(time, channel, *m);
   } else if (channel == "POLICY") {
-    policy_t m;
-    if (!Read(post, m)) return;
-    RequireFinite(time, channel, m);
-    RequireRising(time, channel, m.iteration);
+    const auto m = Decoded<policy_t>(post);
+    if (!m) return;
+    RequireFinite(time, channel, *m);
+    RequireRising(time, channel, m->iteration);
   } else if (channel == "PARAMETER_DISTRIBUTION") {
-    parameter_distribution_t m;
-    if (!Read(post, m)) return;
-    RequireFinite(time, channel, m);
-    RequireRising(time, channel, m.iteration);
+    const auto m = Decoded<parameter_distribution_t>(post);
+    if (!m) return;
+    RequireFinite(time, channel, *m);
+    RequireRising(time, channel, m->iteration);
     const std::span<const uint8_t> bytes = Unsealed(post.data);
-    const auto [said, first] = distributions_.try_emplace(m.iteration, bytes.begin(), bytes.end());
+    const auto [said, first] = distributions_.try_emplace(m->iteration, bytes.begin(), bytes.end());
     if (!std::ranges::equal(said->second, bytes))
-      chronicle_.Violate(6, time, fmt::format("distribution {} has changed", m.iteration));
-    iteration_ = std::max(iteration_, m.iteration);
+      chronicle_.Violate(6, time, fmt::format("distribution {} has changed", m->iteration));
+    iteration_ = std::max(iteration_, m->iteration);
   } else if (channel == "CALIBRATION_STATUS") {
-    calibration_status_t m;
-    if (!Read(post, m)) return;
-    RequireFinite(time, channel, m);
-    RequireRising(time, channel, m.iteration);
+    const auto m = Decoded<calibration_status_t>(post);
+    if (!m) return;
+    RequireFinite(time, channel, *m);
+    RequireRising(time, channel, m->iteration);
     NoteChange(time, "calibrator",
-               fmt::format("iteration {}, {} transitions", m.iteration, m.transitions));
+               fmt::format("iteration {}, {} transitions", m->iteration, m->transitions));
     // With those of a roll-out under way: what is in use when the iteration is complete.
-    transitions_.try_emplace(m.iteration, m.transitions);
+    transitions_.try_emplace(m->iteration, m->transitions);
   } else if (channel == "TRAINING_STATUS") {
-    training_status_t m;
-    if (!Read(post, m)) return;
+    const auto m = Decoded<training_status_t>(post);
+    if (!m) return;
     NoteChange(time, "trainer",
-               fmt::format("iteration {}{}", m.iteration, m.complete ? " complete" : ""));
+               fmt::format("iteration {}{}", m->iteration, m->complete ? " complete" : ""));
     // One that was not complete may be begun anew.
-    if (m.complete) RequireRising(time, channel, m.iteration);
+    if (m->complete) RequireRising(time, channel, m->iteration);
   } else if (channel == "CONTROLLER_STATUS") {
-    controller_status_t m;
-    if (!Read(post, m)) return;
+    const auto m = Decoded<controller_status_t>(post);
+    if (!m) return;
     NoteChange(time, "controller",
-               fmt::format("policy {}: {} {}", m.policy_iteration,
-                           kPhases[static_cast<unsigned char>(m.phase)], m.reason));
-    RequireFinite(time, channel, m);
-    RequireRising(time, channel, m.policy_iteration);
+               fmt::format("policy {}: {} {}", m->policy_iteration,
+                           kPhases[static_cast<unsigned char>(m->phase)], m->reason));
+    RequireFinite(time, channel, *m);
+    RequireRising(time, channel, m->policy_iteration);
   } else if (channel == "DRIVER_STATUS") {
-    if (driver_status_t m; Read(post, m)) {
-      NoteChange(time, "driver",
-                 std::string(kDriverStates[static_cast<unsigned char>(m.state)]) + " " + m.reason);
+    if (const auto m = Decoded<driver_status_t>(post)) {
+      NoteChange(
+          time, "driver",
+          std::string(kDriverStates[static_cast<unsigned char>(m->state)]) + " " + m->reason);
     }
   }
 }

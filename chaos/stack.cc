@@ -86,10 +86,6 @@ std::vector<std::string> Stack::Arguments(const std::string& name) const {
   return all;
 }
 
-void Stack::StartAll() {
-  for (const std::string& name : ProcessNames()) Start(name);
-}
-
 void Stack::Start(const std::string& name) {
   children_.erase(name);
   const auto log = setting_.folder / (name + ".log");

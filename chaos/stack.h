@@ -36,7 +36,6 @@ class Stack {
 
   Stack(Coordinator& coordinator, Setting setting);
 
-  void StartAll();
   /// Not while it runs. @throws std::runtime_error if it cannot be started.
   void Start(const std::string& name);
   /// It is dead at this moment.

@@ -7,13 +7,15 @@
 #include <ctime>
 #include <filesystem>
 #include <iostream>
-#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <utility>
 
-#include "calibrator/diagnostics/robot_sbc.h"
 #include "calibrator/report/report.h"
 #include "calibrator/results/identified_urdf.h"
 #include "calibrator/results/posterior_file.h"
 #include "calibrator/results/summary.h"
+#include "cli/calibrate_sbc.h"
 #include "cli/logs.h"
 #include "cli/outputs.h"
 #include "common/hash.h"
@@ -21,6 +23,7 @@
 #include "common/progress_line.h"
 #include "common/rank_batch_runner.h"
 #include "common/thread_count.h"
+#include "robot/coordinate_names.h"
 #include "umbridge/remote_calibration.h"
 
 namespace plumb {
@@ -32,12 +35,13 @@ struct Interrupted {};
 void PrintGap(const Gap& gap, const RobotDescription& robot) {
   std::cout << fmt::format("  {:<28}{:>7}{:>12}{:>12}{:>12}{:>12}\n", "error of one step", "steps",
                            "without", "residual", "readings", "explained");
+  const std::vector<std::string> names = CoordinateNames(robot).v;
   const auto rows = [&](const char* condition, const ResidualQuality& quality) {
     const Eigen::VectorXd explained = Explained(quality);
     for (Eigen::Index i = 0; i < explained.size(); ++i) {
       const double claimed = quality.claimed(i);
       std::cout << fmt::format("  {:<28}{:>7}{:>12.3g}{:>12.3g}{:>12}{:>10.0f} %\n",
-                               robot.joints[static_cast<size_t>(i)].name + ", " + condition,
+                               names[static_cast<size_t>(i)] + ", " + condition,
                                quality.transitions, quality.before(i), quality.after(i),
                                claimed > 0 ? fmt::format("{:.3g}", claimed) : "not said",
                                100 * explained(i));
@@ -87,13 +91,8 @@ void PrintFindings(const Findings& findings, const RobotDescription& robot) {
 Residuals ResidualsOf(const Findings& findings, const RobotDescription& robot) {
   Residuals residuals{findings.errors, findings.rows, {}};
   for (const char* kind : {"q ", "v "}) {
-    for (const JointDescription& joint : robot.joints) {
-      const std::vector<std::string> axes = joint.num_velocities() == 1
-                                                ? std::vector<std::string>{""}
-                                                : std::vector<std::string>{"/x", "/y", "/z"};
-      for (const std::string& axis : axes)
-        residuals.coordinates.push_back(kind + joint.name + axis);
-    }
+    for (const std::string& name : CoordinateNames(robot).v)
+      residuals.coordinates.push_back(kind + name);
   }
   return residuals;
 }
@@ -130,47 +129,122 @@ uint64_t CalibrationIdentity(const RobotDescription& robot, const CalibrateFlags
   return identity;
 }
 
-int Sbc(const CalibrateFlags& flags, const RobotDescription& robot, const std::vector<Log>& logs,
-        ProgressLine& line, const std::function<void()>& look) {
-  CalibrationOptions options = flags.options;
-  options.method = "laplace", options.horizons = {1};
-  const Findings findings = Calibrate(robot, logs, options);
-  std::vector<Rollout> rollouts;
-  for (const Log& log : logs)
-    rollouts.insert(rollouts.end(), log.rollouts.begin(), log.rollouts.end());
-  RobotSbcOptions sbc;
-  sbc.runs = flags.sbc, sbc.seed = options.seed, sbc.threads = options.execution.threads;
-  sbc.progress = [&](double share) { look(), line.Show("simulation-based calibration", share); };
-  std::cout << SbcSummary(
-                   RunRobotSbc(std::make_shared<Model>(robot), rollouts, findings.noise_sd, sbc))
-            << std::endl;
-  return 0;
-}
+/// The three ways to calibrate, and what they begin with.
+class CalibrateCommand {
+ public:
+  CalibrateCommand(Process& process, CalibrateFlags flags, const std::string& command)
+      : process_(process),
+        command_(command),
+        flags_(std::move(flags)),
+        robot_(LoadRobot(flags_.robot)),
+        journal_file_(flags_.output + ".journal"),
+        line_(speaks()) {
+    if (!speaks()) spdlog::set_level(spdlog::level::err);
+    if (ranks_.size() > 1 && (foreign() || judges())) {
+      if (!speaks()) spdlog::set_level(spdlog::level::off);  // the first says it
+      throw std::invalid_argument("--model and --sbc are for one rank");
+    }
+    if (speaks() && !judges()) RequireFiles();
+    RequireDiscrepancy(flags_.options.discrepancy);
+    flags_.options.residual = flags_.options.residual && robot_.calibration.residual;
+    logs_ = ReadLogs(flags_.logs, flags_.tables, robot_);
+    if (speaks()) PrintLogs(logs_);
+    flags_.options.execution.threads = ThreadCount(flags_.threads, ranks_.OnThisMachine().size());
+    flags_.options.progress = [this](const std::string& what, double share) {
+      Look();
+      line_.Show(what, share);
+    };
+  }
 
-// What judges a model needs simulations of ours.
-void RequireForRemote(const CalibrateFlags& flags, int ranks) {
-  if (flags.options.method != "auto" && flags.options.method != "laplace")
-    throw std::invalid_argument("--model is calibrated by laplace: no other --method");
-  if (!flags.report.empty() || flags.strict || flags.sbc > 0)
-    throw std::invalid_argument("--model excludes --report, --strict and --sbc: nothing judges it");
-  if (ranks > 1) throw std::invalid_argument("--model is for one rank");
-}
+  int Run() {
+    try {
+      if (foreign()) return CalibrateForeign();
+      if (judges())
+        return JudgePosteriors(robot_, logs_, flags_.options, flags_.sbc, flags_.strict);
+      return CalibrateOurs();
+    } catch (const Interrupted&) {
+      if (speaks() && !foreign() && !judges())
+        std::cerr << "\ninterrupted; the same command goes on from " << journal_file_ << std::endl;
+      throw;
+    }
+  }
 
-int CalibrateForeign(const CalibrateFlags& flags, const RobotDescription& robot,
-                     const std::vector<Log>& logs, const std::string& command) {
-  RemoteModel model(flags.model, flags.model_name,
-                    static_cast<Eigen::Index>(robot.parameters.size()),
-                    NextStatesSize(robot, logs));
-  const Findings findings = CalibrateRemote(robot, logs, model, flags.options);
-  PrintFindings(findings, robot);
-  WritePosterior(flags.output, findings, robot,
-                 ProvenanceOf(logs, flags.options, command, std::time(nullptr)));
-  const Summary summary = Summarise(findings, robot);
-  if (!flags.urdf.empty()) WriteIdentifiedUrdf(flags.urdf, robot, summary.mean, summary.sd);
-  std::cout << "wrote " << flags.output << (flags.urdf.empty() ? "" : ", " + flags.urdf)
-            << std::endl;
-  return 0;
-}
+ private:
+  bool speaks() const { return ranks_.rank() == 0; }
+  bool foreign() const { return !flags_.model.empty(); }
+  bool judges() const { return flags_.sbc > 0; }
+
+  void Look() {
+    if (process_.stopping()) throw Interrupted();
+  }
+
+  void RequireFiles() const {
+    std::vector<std::string> inputs = FilesOf(robot_);
+    inputs.insert(inputs.end(), flags_.logs.begin(), flags_.logs.end());
+    inputs.insert(inputs.end(), flags_.tables.begin(), flags_.tables.end());
+    RequireOutputs({flags_.output, flags_.report, flags_.urdf}, inputs);
+    RequireApart({journal_file_, flags_.report, flags_.urdf});
+  }
+
+  int CalibrateOurs() {
+    std::optional<NameLock> lock;
+    std::optional<Journal> journal;
+    if (speaks()) {
+      lock.emplace("journal " + NameOfFile(journal_file_),
+                   journal_file_ + ": another process is at work on it: give another --output");
+      journal.emplace(journal_file_, CalibrationIdentity(robot_, flags_, logs_));
+    }
+    RankBatchRunner batches(ranks_, journal ? &*journal : nullptr);
+    flags_.options.execution.batches = &batches;
+    const Findings findings = Calibrate(robot_, logs_, flags_.options);
+    if (!speaks()) return 0;
+    if (journal->resumed() > 0)
+      std::cout << fmt::format("went on from {}: {} batches of simulations were there\n",
+                               journal_file_, journal->resumed());
+    PrintFindings(findings, robot_);
+    if (flags_.options.replay) PrintReplay(findings.holdout.replay);
+    Write(findings);
+    journal->Finish();
+    PrintWritten();
+    return flags_.strict && !Trustworthy(findings) ? 3 : 0;
+  }
+
+  int CalibrateForeign() {
+    RemoteModel model(flags_.model, flags_.model_name,
+                      static_cast<Eigen::Index>(robot_.parameters.size()),
+                      NextStatesSize(robot_, logs_), [this] { Look(); });
+    const Findings findings = CalibrateRemote(robot_, logs_, model, flags_.options);
+    PrintFindings(findings, robot_);
+    Write(findings);
+    PrintWritten();
+    return 0;
+  }
+
+  void Write(const Findings& findings) const {
+    const Provenance provenance = ProvenanceOf(logs_, flags_.options, command_, std::time(nullptr));
+    WritePosterior(flags_.output, findings, robot_, provenance);
+    if (!flags_.report.empty())
+      WriteReport(flags_.report, findings, robot_, provenance, ResidualsOf(findings, robot_));
+    const Summary summary = Summarise(findings, robot_);
+    if (!flags_.urdf.empty())
+      WriteIdentifiedUrdf(flags_.urdf, robot_, summary.mean, summary.sd,
+                          findings.gap.residual != nullptr);
+  }
+
+  void PrintWritten() const {
+    std::cout << "wrote " << flags_.output << (flags_.report.empty() ? "" : ", " + flags_.report)
+              << (flags_.urdf.empty() ? "" : ", " + flags_.urdf) << std::endl;
+  }
+
+  Process& process_;
+  const std::string& command_;
+  const Ranks ranks_;
+  CalibrateFlags flags_;
+  const RobotDescription robot_;
+  const std::string journal_file_;
+  ProgressLine line_;
+  std::vector<Log> logs_;
+};
 
 }  // namespace
 
@@ -182,69 +256,9 @@ std::string MethodHelp() {
 }
 
 int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& command) {
-  const Ranks ranks;
-  const bool speaks = ranks.rank() == 0;
-  if (!speaks) spdlog::set_level(spdlog::level::err);
-  const RobotDescription robot = LoadRobot(flags.robot);
-  const std::string journal_file = flags.output + ".journal";
-  if (speaks) {
-    std::vector<std::string> inputs = FilesOf(robot);
-    inputs.insert(inputs.end(), flags.logs.begin(), flags.logs.end());
-    inputs.insert(inputs.end(), flags.tables.begin(), flags.tables.end());
-    RequireOutputs({flags.output, flags.report, flags.urdf}, inputs);
-    RequireApart({journal_file, flags.report, flags.urdf});
-  }
-  if (!flags.model.empty()) RequireForRemote(flags, ranks.size());
-  flags.options.residual = flags.options.residual && robot.calibration.residual;
-  const std::vector<Log> logs = ReadLogs(flags.logs, flags.tables, robot);
-  if (speaks) PrintLogs(logs);
-  flags.options.execution.threads = ThreadCount(flags.threads, ranks.OnThisMachine().size());
-  ProgressLine line(speaks);
-  const auto look = [&] {
-    if (process.stopping()) throw Interrupted();
-  };
   try {
-    if (!flags.model.empty()) {
-      flags.options.progress = [&](const std::string& what, double share) {
-        look(), line.Show(what, share);
-      };
-      return CalibrateForeign(flags, robot, logs, command);
-    }
-    if (flags.sbc > 0) return Sbc(flags, robot, logs, line, look);
-    std::optional<NameLock> lock;
-    std::optional<Journal> journal;
-    if (speaks) {
-      lock.emplace("journal " + NameOfFile(journal_file),
-                   journal_file + ": another process is at work on it: give another --output");
-    }
-    if (speaks) journal.emplace(journal_file, CalibrationIdentity(robot, flags, logs));
-    RankBatchRunner batches(ranks, journal ? &*journal : nullptr);
-    flags.options.execution.batches = &batches;
-    flags.options.progress = [&](const std::string& what, double share) {
-      look(), line.Show(what, share);
-    };
-    const Findings findings = Calibrate(robot, logs, flags.options);
-    if (!speaks) return 0;
-    if (journal->resumed() > 0)
-      std::cout << fmt::format("went on from {}: {} batches of simulations were there\n",
-                               journal_file, journal->resumed());
-    PrintFindings(findings, robot);
-    if (flags.options.replay) PrintReplay(findings.holdout.replay);
-    const Provenance provenance = ProvenanceOf(logs, flags.options, command, std::time(nullptr));
-    WritePosterior(flags.output, findings, robot, provenance);
-    const Summary summary = Summarise(findings, robot);
-    if (!flags.report.empty())
-      WriteReport(flags.report, findings, robot, provenance, ResidualsOf(findings, robot));
-    if (!flags.urdf.empty())
-      WriteIdentifiedUrdf(flags.urdf, robot, summary.mean, summary.sd,
-                          findings.gap.residual != nullptr);
-    journal->Finish();
-    std::cout << "wrote " << flags.output << (flags.report.empty() ? "" : ", " + flags.report)
-              << (flags.urdf.empty() ? "" : ", " + flags.urdf) << std::endl;
-    return flags.strict && !Trustworthy(findings) ? 3 : 0;
-  } catch (const Interrupted&) {
-    if (speaks && flags.sbc == 0 && flags.model.empty())
-      std::cerr << "\ninterrupted; the same command goes on from " << journal_file << std::endl;
+    return CalibrateCommand(process, std::move(flags), command).Run();
+  } catch (const Interrupted&) {  // its ranks have said no farewell: mpirun ends the others
     return 130;
   }
 }

@@ -32,7 +32,8 @@ std::string MethodHelp();
 /// exit status: 0, 130 if it was interrupted; with `strict` 3 if the posterior predicts no better
 /// than the prior, the model cannot explain the logs, or they do not agree.
 /// @throws std::invalid_argument or std::runtime_error, one line for people: robot, logs, files.
-/// With a `model` it is that simulator's parameters that are inferred: CalibrateRemote.
+/// With a `model` it is that simulator's parameters that are inferred: CalibrateRemote. With `sbc`
+/// posteriors are judged, and nothing is written: JudgePosteriors. Both are for one rank.
 /// Has threads of its own; call it from one.
 int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& command);
 

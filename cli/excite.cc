@@ -23,12 +23,15 @@ constexpr size_t kMaxRows = 10;
 
 std::string DescribeStart(const RobotDescription& robot, uint64_t seed) {
   const auto [q, v] = ExcitationStart(robot, seed);
-  std::string text = "it begins at";
-  for (Eigen::Index i = 0; i < q.size(); ++i) {
-    text += fmt::format("{} {} {:.4g} (speed {:.3g})", i == 0 ? "" : ",",
-                        robot.joints[static_cast<size_t>(i)].name, q(i), v(i));
+  std::vector<std::string> joints;
+  Eigen::Index position = 0, velocity = 0;
+  for (const JointDescription& joint : robot.joints) {
+    joints.push_back(fmt::format("{} {:.4g} (speed {:.3g})", joint.name,
+                                 fmt::join(q.segment(position, joint.num_positions()), " "),
+                                 fmt::join(v.segment(velocity, joint.num_velocities()), " ")));
+    position += joint.num_positions(), velocity += joint.num_velocities();
   }
-  return text;
+  return fmt::format("it begins at {}", fmt::join(joints, ", "));
 }
 
 std::string Table(const RobotDescription& robot, const std::vector<RatedExcitation>& rated) {
@@ -82,7 +85,7 @@ std::vector<Snapshot> Film(const RobotDescription& robot, const RatedExcitation&
 
 }  // namespace
 
-int Excite(Process& process, const ExciteFlags& flags) {
+int Excite(const ExciteFlags& flags) {
   const RobotDescription robot = LoadRobot(flags.robot);
   for (const std::string& warning : robot.warnings) spdlog::warn(warning);
   std::vector<std::string> inputs = FilesOf(robot);
@@ -97,7 +100,6 @@ int Excite(Process& process, const ExciteFlags& flags) {
                              ? PriorGaussian(robot)
                              : Moments(ReadSimulators(flags.posterior, robot).mixture);
   const std::vector<RatedExcitation> rated = RateExcitations(robot, prior, settings);
-  if (process.stopping()) return 130;
   std::cout << fmt::format("{}, task {}, seed {}: {} of {} excitations keep within the limits\n",
                            robot.name, robot.task.name, flags.seed, rated.size(), flags.candidates);
   if (rated.empty()) {

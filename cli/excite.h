@@ -3,8 +3,6 @@
 #include <cstdint>
 #include <string>
 
-#include "common/process.h"
-
 namespace plumb {
 
 /// The flags of `plumb excite`.
@@ -22,10 +20,10 @@ struct ExciteFlags {
 /// `plumb excite`: looks for the efforts that would tell most of the robot's parameters and stay
 /// within its limits, prints what they will tell, and writes the best ones as a table t,
 /// u/<joint>... in the task's units of action, one row per control step. No messages, no buses.
-/// @return exit status: 0; 1 if no excitation keeps within the limits, and no file is written then;
-/// 130 if it was interrupted. Works with a thread per core; call it from one.
+/// @return exit status: 0; 1 if no excitation keeps within the limits, and no file is written then.
+/// Works with a thread per core; call it from one.
 /// @throws std::invalid_argument or std::runtime_error, one line for people: robot, posterior,
 /// files.
-int Excite(Process& process, const ExciteFlags& flags);
+int Excite(const ExciteFlags& flags);
 
 }  // namespace plumb

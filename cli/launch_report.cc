@@ -10,6 +10,7 @@
 #include "calibrator/diagnostics/holdout.h"
 #include "calibrator/report/report_plots.h"
 #include "cli/run_plots.h"
+#include "common/median.h"
 #include "plot/html.h"
 #include "plot/svg.h"
 
@@ -46,17 +47,19 @@ class LaunchPage {
 
   std::string Print() const {
     const std::string title = "Run of " + robot_.name;
-    return Page(title, "<h1>" + Escape(title) + "</h1>\n<p class=\"sub\">" + Escape(Subtitle()) +
-                           "</p>\n" + Verdicts() + Group("Policies", PolicyPanel()) +
-                           (iterations_.empty()
-                                ? ""
-                                : Group("Learning", ParameterPanel() + KnownPanel() +
-                                                        PredictionPanel() + IterationPanel())) +
-                           Group("How it was found", Reproduce()));
+    return Page(
+        title,
+        "<h1>" + Escape(title) + "</h1>\n<p class=\"sub\">" + Escape(Subtitle()) + "</p>\n" +
+            Verdicts() + (policy().is_null() ? "" : Group("Policies", PolicyPanel())) +
+            (iterations_.empty() ? ""
+                                 : Group("Learning", ParameterPanel() + KnownPanel() +
+                                                         PredictionPanel() + IterationPanel())) +
+            Group("How it was found", Reproduce()));
   }
 
  private:
   std::string Text(const char* field) const { return summary_.at(field).get<std::string>(); }
+  const json& policy() const { return summary_.at("policy"); }
 
   std::string Subtitle() const {
     return fmt::format("{} iterations on {}, in {} time, seed {}", iterations_.size(), Text("bus"),
@@ -65,22 +68,21 @@ class LaunchPage {
 
   std::string Verdicts() const {
     std::string html = "<div class=\"verdicts\">\n";
-    const json& policy = summary_.at("policy");
-    html += Verdict("good",
-                    fmt::format("Policy {} runs since iteration {}",
-                                policy.at("iteration").get<int>(), policy.at("since").get<int>()),
-                    policy.at("why").get<std::string>());
-    std::vector<double> returns = Reals(summary_.at("evaluation_returns"));
+    if (!policy().is_null()) {
+      html +=
+          Verdict("good",
+                  fmt::format("Policy {} runs since iteration {}",
+                              policy().at("iteration").get<int>(), policy().at("since").get<int>()),
+                  policy().at("why").get<std::string>());
+    }
+    const std::vector<double> returns = Reals(summary_.at("evaluation_returns"));
     if (!returns.empty()) {
-      std::ranges::sort(returns);
-      const size_t half = returns.size() / 2;
-      const double median =
-          returns.size() % 2 == 1 ? returns[half] : (returns[half - 1] + returns[half]) / 2;
-      html += Verdict("", "What it returns on the robot",
-                      fmt::format("Mean {:.0f}, median {:.0f}, worst {:.0f} of {} roll-outs.",
-                                  std::accumulate(returns.begin(), returns.end(), 0.0) /
-                                      static_cast<double>(returns.size()),
-                                  median, returns.front(), returns.size()));
+      html +=
+          Verdict("", "What it returns on the robot",
+                  fmt::format("Mean {:.0f}, median {:.0f}, worst {:.0f} of {} roll-outs.",
+                              std::accumulate(returns.begin(), returns.end(), 0.0) /
+                                  static_cast<double>(returns.size()),
+                              Median(returns), *std::ranges::min_element(returns), returns.size()));
     }
     if (!iterations_.empty()) {
       const auto alarm = iterations_.back().at("alarm").get<std::string>(),
@@ -105,15 +107,18 @@ class LaunchPage {
 
   PolicyReturns Returns() const {
     PolicyReturns returns;
+    returns.last = policy().at("iteration").get<int>();  // where no iteration tells
     for (const json& iteration : iterations_) {
-      returns.simulated.push_back(Real(iteration.at("simulated_return")));
-      returns.robot.push_back(Real(iteration.at("robot_return")));
+      returns.last = iteration.at("iteration").get<int>();
+      returns.simulated[returns.last - 1] = Real(iteration.at("simulated_return"));
+      returns.robot[returns.last - 1] = Real(iteration.at("robot_return"));
     }
     returns.in_the_end = Reals(summary_.at("evaluation_returns"));
     const json& decisions = summary_.at("decisions");
     for (const json& decision : decisions) {
       const bool accepted = decision.at("accepted").get<bool>();
-      returns.incumbent.push_back(Real(decision.at(accepted ? "return" : "incumbent_return")));
+      returns.incumbent[decision.at("policy").get<int>()] =
+          Real(decision.at(accepted ? "return" : "incumbent_return"));
     }
     return returns;
   }
@@ -150,15 +155,16 @@ class LaunchPage {
     Table table({"parameter", "unit", "prior", "learnt", "hidden", "error"});
     for (size_t i = 0; i < robot_.parameters.size(); ++i) {
       const ParameterDescription& p = robot_.parameters[i];
-      std::vector<double> mean, sd;
+      std::vector<Learnt> learnt;
       for (const json& iteration : iterations_) {
-        mean.push_back(Real(iteration.at("mean").at(i)));
-        sd.push_back(Real(iteration.at("sd").at(i)));
+        learnt.push_back({iteration.at("iteration").get<int>(), Real(iteration.at("mean").at(i)),
+                          Real(iteration.at("sd").at(i))});
       }
-      const double truth = i < hidden.size() ? hidden[i] : NAN, error = mean.back() / truth - 1;
-      drawings += LearnedPlot(p, mean, sd, truth);
+      const Learnt& last = learnt.back();
+      const double truth = i < hidden.size() ? hidden[i] : NAN, error = last.mean / truth - 1;
+      drawings += LearnedPlot(p, learnt, truth);
       table.Add({Escape(p.name), Escape(p.unit), PlusMinus(p.mean, std::sqrt(p.variance)),
-                 PlusMinus(mean.back(), sd.back()), Number(truth, sd.back()),
+                 PlusMinus(last.mean, last.sd), Number(truth, last.sd),
                  std::isfinite(error) ? fmt::format("{:.2f} %", 100 * error) : Digits(error)});
     }
     return Panel(

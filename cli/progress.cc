@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "common/median.h"
 #include "common/outside_text.h"
 #include "controller/trial.h"
 #include "plumb/policy_t.hpp"
@@ -17,13 +18,6 @@ double Mean(const std::vector<double>& values) {
   return values.empty() ? NAN
                         : std::accumulate(values.begin(), values.end(), 0.0) /
                               static_cast<double>(values.size());
-}
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return NAN;
-  std::sort(values.begin(), values.end());
-  const size_t half = values.size() / 2;
-  return values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
 }
 
 const char* DriverState(int8_t state) {

@@ -63,8 +63,12 @@ nlohmann::json Progress::Summary(const Eigen::VectorXd& truth) const {
                                      {"seconds", iteration.seconds}});
   }
   if (!done_.empty()) summary["identifiability"] = done_.back().calibration.identifiability;
-  summary["policy"] = {
-      {"iteration", training_.incumbent}, {"since", training_.incumbent_since}, {"why", Why()}};
+  if (training_.incumbent >= 0) {
+    summary["policy"] = {
+        {"iteration", training_.incumbent}, {"since", training_.incumbent_since}, {"why", Why()}};
+  } else {
+    summary["policy"] = nullptr;
+  }
   summary["decisions"] = json::array();
   for (const auto& [challenger, decision] : decisions_) {
     summary["decisions"].push_back({{"policy", challenger},

@@ -28,6 +28,7 @@ void AddDoctor(CLI::App& app, Action& action) {
       ->allow_extra_args(false)
       ->capture_default_str();
   SetAction(*doctor, action, [buses](Process& process) {
+    process.EndAtOnce();
     return Doctor(process.lcm_url(), *buses, process.key_file());
   });
 }
@@ -40,13 +41,12 @@ void AddCan(CLI::App& app, Action& action) {
   CLI::App* plan =
       AddCommand(*can, "plan", "ids, load and response times; exit status 1 if it cannot work");
   plan->add_option("robot", *robot, kRobot)->required();
-  SetAction(*plan, action, [robot](Process&) { return PrintBusPlan(*robot); });
+  SetAction(*plan, action, [robot] { return PrintBusPlan(*robot); });
   CLI::App* dbc = AddCommand(*can, "dbc", "all messages of a bus as a DBC file, for other tools");
   dbc->add_option("robot", *robot, kRobot)->required();
   dbc->add_option("--bus", *bus, "name of the bus; default: the only one");
   dbc->add_option("--output", *output, "file; default: print it");
-  SetAction(*dbc, action,
-            [robot, bus, output](Process&) { return WriteDbc(*robot, *bus, *output); });
+  SetAction(*dbc, action, [robot, bus, output] { return WriteDbc(*robot, *bus, *output); });
 }
 
 void AddEstimate(CLI::App& app, Action& action) {
@@ -57,7 +57,7 @@ void AddEstimate(CLI::App& app, Action& action) {
                               "infer the noise of sensors and motion from a log, for robot.toml");
   tune->add_option("robot", *robot, kRobot)->required();
   tune->add_option("--log", *log, "LCM log with JOINT_STATE and IMU")->required();
-  SetAction(*tune, action, [robot, log](Process&) { return TuneEstimator(*robot, *log); });
+  SetAction(*tune, action, [robot, log] { return TuneEstimator(*robot, *log); });
 }
 
 void AddRequests(CLI::App& app, Action& action) {
@@ -116,7 +116,7 @@ void AddExport(CLI::App& app, Action& action) {
   export_log->add_option("--csv", flags->csv, "a folder: a table for each channel");
   export_log->add_option("--robot", flags->robot,
                          "robot folder or TOML file; default: the one beside the log");
-  SetAction(*export_log, action, [flags](Process&) { return Export(*flags); });
+  SetAction(*export_log, action, [flags] { return Export(*flags); });
 }
 
 void AddMeldis(CLI::App& app, Action& action) {
@@ -177,10 +177,10 @@ void AddLaunch(CLI::App& app, const std::string& line, Action& action) {
                    "real time, 0 = no limit")
       ->check(CLI::Range(0.0, 100.0));
   AddRealtimeFlag(*launch, flags->priority);
-  launch
-      ->add_flag("--real", flags->real,
-                 "the robot itself is on the bus: no virtual one, ask before arming")
-      ->excludes(real_time);
+  auto* real = launch
+                   ->add_flag("--real", flags->real,
+                              "the robot itself is on the bus: no virtual one, ask before arming")
+                   ->excludes(real_time);
   launch
       ->add_flag("--unsigned", flags->allow_unsigned,
                  "let the driver obey anybody, although LCM leaves this machine")
@@ -188,8 +188,10 @@ void AddLaunch(CLI::App& app, const std::string& line, Action& action) {
   launch->add_option("--log", flags->log, "record all messages to this LCM log");
   launch->add_flag("--overwrite", flags->overwrite,
                    "write over a log that no run in virtual time of this robot would make again");
-  launch->add_option("--can-log", flags->can_log,
-                     "in virtual time: record all frames to this file, as candump -l does");
+  launch
+      ->add_option("--can-log", flags->can_log,
+                   "in virtual time: record all frames to this file, as candump -l does")
+      ->excludes(real_time, real);
   auto* dashboard =
       launch
           ->add_option("--dashboard", flags->dashboard,
@@ -206,10 +208,16 @@ void AddLaunch(CLI::App& app, const std::string& line, Action& action) {
   launch->add_option("--report", flags->report, "how it went, for people: an HTML page");
   launch->add_option("--output", flags->output,
                      "folder for logs and checkpoints; default: a new one in runs/");
-  SetAction(*launch, action, [flags, launch](Process& process) {
+  const auto launches = [flags, launch](Process& process) {
     if (launch->count("--dashboard") > 0 && flags->dashboard.empty())
       flags->dashboard = "127.0.0.1:8765";
     return Launch(process, *flags);
+  };
+  SetAction(*launch, action, launches, [flags]() -> std::string {
+    const bool in_vain = flags->priority != 0 && !flags->real_time && !flags->real;
+    return in_vain ? "--realtime-priority needs --real-time or --real: in virtual time there are "
+                     "no priorities"
+                   : "";
   });
 }
 

@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "robot/coordinate_names.h"
+
 namespace plumb {
 namespace {
 
@@ -40,18 +42,14 @@ std::string Totals(const std::vector<EpisodeSummary>& episodes) {
 }
 
 std::string CsvHeader(const RobotDescription& robot) {
-  std::string header = "t", velocities, actions;
+  const CoordinateNames names(robot);
+  std::string header = "t";
+  for (const std::string& name : names.q) header += ",q/" + name;
+  for (const std::string& name : names.v) header += ",v/" + name;
   for (const JointDescription& joint : robot.joints) {
-    if (joint.type == JointDescription::Type::kSpherical) {
-      for (const char* part : {"w", "x", "y", "z"}) header += ",q/" + joint.name + "/" + part;
-      for (const char* part : {"x", "y", "z"}) velocities += ",v/" + joint.name + "/" + part;
-    } else {
-      header += ",q/" + joint.name;
-      velocities += ",v/" + joint.name;
-    }
-    if (!joint.passive) actions += ",u/" + joint.name;
+    if (!joint.passive) header += ",u/" + joint.name;
   }
-  return header + velocities + actions + ",reward,terminated,truncated\n";
+  return header + ",reward,terminated,truncated\n";
 }
 
 void AppendCsv(const SimulatedStep& step, std::string& csv) {

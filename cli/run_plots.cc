@@ -26,20 +26,20 @@ struct Extent {
 }  // namespace
 
 std::string ReturnsPlot(const PolicyReturns& returns) {
-  Extent range;
-  for (const auto* values :
-       {&returns.simulated, &returns.robot, &returns.incumbent, &returns.in_the_end})
-    for (const double value : *values) range.Take(value);
+  Extent range, policies;
+  for (const auto* values : {&returns.simulated, &returns.robot, &returns.incumbent})
+    for (const auto& [policy, value] : *values) policies.Take(policy), range.Take(value);
+  for (const double value : returns.in_the_end) range.Take(value);
   if (range.empty()) return "";
-  const size_t count = returns.robot.size() + 1;  // and the last one
+  policies.Take(returns.last);
   Svg svg(920, 300, "returns of the policies");
-  const Axis x(-0.4, static_cast<double>(count) - 0.6, 72, 906),
+  const Axis x(policies.low - 0.4, policies.high + 0.4, 72, 906),
       y(range.low - range.margin(), range.high + range.margin(), 254, 12);
-  svg.Frame(x, y, "policy", "return of an episode", std::min<int>(static_cast<int>(count), 12), 6);
-  const auto draw = [&](const std::vector<double>& values, const std::string& css) {
+  svg.Frame(x, y, "policy", "return of an episode",
+            std::min(static_cast<int>(policies.high - policies.low) + 1, 12), 6);
+  const auto draw = [&](const std::map<int, double>& values, const std::string& css) {
     Points line;
-    for (size_t k = 0; k < values.size(); ++k)
-      line.emplace_back(x.Pixel(static_cast<double>(k)), y.Pixel(values[k]));
+    for (const auto& [policy, value] : values) line.emplace_back(x.Pixel(policy), y.Pixel(value));
     svg.Path(line, css + " line thick");
     if (css == "reference") return;
     for (const Eigen::Vector2d& point : line) {
@@ -50,35 +50,36 @@ std::string ReturnsPlot(const PolicyReturns& returns) {
   draw(returns.simulated, "simulation");
   draw(returns.robot, "robot");
   for (const double value : returns.in_the_end)
-    svg.Circle(x.Pixel(static_cast<double>(count) - 1), y.Pixel(value), 2.5, "robot mark");
+    svg.Circle(x.Pixel(returns.last), y.Pixel(value), 2.5, "robot mark");
   return svg.Print();
 }
 
-std::string LearnedPlot(const ParameterDescription& parameter, const std::vector<double>& mean,
-                        const std::vector<double>& sd, double hidden) {
+std::string LearnedPlot(const ParameterDescription& parameter, const std::vector<Learnt>& learnt,
+                        double hidden) {
   Extent range;
-  for (size_t k = 0; k < mean.size(); ++k) {
-    range.Take(mean[k] - kNormal95 * sd[k]);
-    range.Take(mean[k] + kNormal95 * sd[k]);
+  for (const Learnt& after : learnt) {
+    range.Take(after.mean - kNormal95 * after.sd);
+    range.Take(after.mean + kNormal95 * after.sd);
   }
   if (range.empty()) return "";
   range.Take(hidden);
   const double prior_sd = std::sqrt(parameter.variance);
   Svg svg(304, 210, "what was learnt of " + parameter.name);
-  const Axis x(0, static_cast<double>(mean.size()), 66, 294),
+  const int last = learnt.back().iteration;
+  const Axis x(0, last, 66, 294),
       y(range.low - range.margin(), range.high + range.margin(), 166, 10);
   svg.Frame(x, y, "iteration", Shorten(parameter.name + " [" + parameter.unit + "]", 28),
-            std::min<int>(static_cast<int>(mean.size()) + 1, 6), 5);
+            std::min(last + 1, 6), 5);
   svg.BeginClip(x.from(), y.to(), x.to() - x.from(), y.from() - y.to());
   Points band{{x.Pixel(0), y.Pixel(parameter.mean + kNormal95 * prior_sd)}},
       middle{{x.Pixel(0), y.Pixel(parameter.mean)}};
-  for (size_t k = 0; k < mean.size(); ++k) {
-    const double at = x.Pixel(static_cast<double>(k + 1));
-    band.emplace_back(at, y.Pixel(mean[k] + kNormal95 * sd[k]));
-    middle.emplace_back(at, y.Pixel(mean[k]));
+  for (const Learnt& after : learnt) {
+    const double at = x.Pixel(after.iteration);
+    band.emplace_back(at, y.Pixel(after.mean + kNormal95 * after.sd));
+    middle.emplace_back(at, y.Pixel(after.mean));
   }
-  for (size_t k = mean.size(); k-- > 0;)
-    band.emplace_back(x.Pixel(static_cast<double>(k + 1)), y.Pixel(mean[k] - kNormal95 * sd[k]));
+  for (auto after = learnt.rbegin(); after != learnt.rend(); ++after)
+    band.emplace_back(x.Pixel(after->iteration), y.Pixel(after->mean - kNormal95 * after->sd));
   band.emplace_back(x.Pixel(0), y.Pixel(parameter.mean - kNormal95 * prior_sd));
   svg.Path(band, "band", true);
   svg.Path(middle, "posterior line thick");

@@ -30,10 +30,7 @@ int ServeModel(Process& process, const ServeModelFlags& flags) {
   std::cout << "\n";
   for (const ServedModel& model : models.Models())
     std::cout << fmt::format("{}: {} -> {}\n", model.name, model.inputs, model.outputs);
-  const bool six = listen.address.find(':') != std::string::npos;
-  std::cout << fmt::format("http://{}:{}", six ? "[" + listen.address + "]" : listen.address,
-                           server.port())
-            << std::endl;
+  std::cout << server.url() << std::endl;
   server.Run(process.stop_fd(), [&] { return process.stopping(); });
   return 0;
 }

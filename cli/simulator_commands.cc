@@ -62,46 +62,53 @@ void AddCalibrate(CLI::App& app, const std::string& line, Action& action) {
       ->add_option("--csv", flags->tables,
                    "table of transitions, columns: docs/commands.md; may be given several times")
       ->allow_extra_args(false);
-  calibrate->add_option("--method", flags->options.method, "of inference")
-      ->check(CLI::IsMember(CalibrationMethods()))
-      ->capture_default_str();
+  auto* method = calibrate->add_option("--method", flags->options.method, "of inference")
+                     ->check(CLI::IsMember(CalibrationMethods()))
+                     ->capture_default_str();
   calibrate->footer(MethodHelp());
   calibrate->add_option("--seed", flags->options.seed, "of all random numbers")
       ->check(SeedRange())
       ->capture_default_str();
-  calibrate->add_option("--output", flags->output, "the posterior, for programs (JSON)")
-      ->capture_default_str();
-  calibrate->add_option("--report", flags->report, "the findings, for people: an HTML page");
-  calibrate->add_option("--urdf", flags->urdf, "the robot's URDF with the identified parameters");
-  calibrate
-      ->add_option("--horizons", flags->options.horizons,
-                   "control steps of the windows, stage by stage")
-      ->check(CLI::Range(1, 1000))
-      ->delimiter(',')
-      ->capture_default_str();
-  calibrate
-      ->add_option_function<double>(
-          "--budget",
-          [flags](double transitions) { flags->options.budget = std::llround(transitions); },
-          "transitions that sampling methods may simulate, e.g. 1e6")
-      ->check(CLI::Range(100.0, 1e12))
-      ->default_str(std::to_string(flags->options.budget));
-  calibrate
-      ->add_option("--discrepancy", flags->options.discrepancy,
-                   "of methods that know only simulations")
-      ->capture_default_str();
-  calibrate
-      ->add_option("--threads", flags->threads,
-                   "0 = one per core; the result does not depend on it")
-      ->check(CLI::Range(0, 1024))
-      ->capture_default_str();
-  calibrate
-      ->add_option("--sbc", flags->sbc,
-                   "instead: that many runs of simulation-based calibration on motions like these")
-      ->check(CLI::Range(0, 1000000))
-      ->capture_default_str();
-  calibrate->add_flag("!--no-residual", flags->options.residual,
-                      "do not learn what the model lacks where it cannot explain the robot");
+  auto* output =
+      calibrate->add_option("--output", flags->output, "the posterior, for programs (JSON)")
+          ->capture_default_str();
+  auto* report =
+      calibrate->add_option("--report", flags->report, "the findings, for people: an HTML page");
+  auto* urdf = calibrate->add_option("--urdf", flags->urdf,
+                                     "the robot's URDF with the identified parameters");
+  auto* horizons = calibrate
+                       ->add_option("--horizons", flags->options.horizons,
+                                    "control steps of the windows, stage by stage")
+                       ->check(CLI::Range(1, 1000))
+                       ->delimiter(',')
+                       ->capture_default_str();
+  auto* budget =
+      calibrate
+          ->add_option_function<double>(
+              "--budget",
+              [flags](double transitions) { flags->options.budget = std::llround(transitions); },
+              "transitions that sampling methods may simulate, e.g. 1e6")
+          ->check(CLI::Range(100.0, 1e12))
+          ->default_str(std::to_string(flags->options.budget));
+  auto* discrepancy = calibrate
+                          ->add_option("--discrepancy", flags->options.discrepancy,
+                                       "of methods that know only simulations")
+                          ->capture_default_str();
+  auto* threads = calibrate
+                      ->add_option("--threads", flags->threads,
+                                   "0 = one per core; the result does not depend on it")
+                      ->check(CLI::Range(0, 1024))
+                      ->capture_default_str();
+  auto* sbc =
+      calibrate
+          ->add_option(
+              "--sbc", flags->sbc,
+              "instead: that many runs of simulation-based calibration on motions like these")
+          ->check(CLI::Range(0, 1000000))
+          ->capture_default_str();
+  auto* no_residual =
+      calibrate->add_flag("!--no-residual", flags->options.residual,
+                          "do not learn what the model lacks where it cannot explain the robot");
   auto* model = calibrate->add_option(
       "--model", flags->model,
       "instead of our simulator: one that an UM-Bridge server has, http://HOST:PORT");
@@ -110,12 +117,23 @@ void AddCalibrate(CLI::App& app, const std::string& line, Action& action) {
                    "of that server's: parameters -> q, v at each transition's end")
       ->needs(model)
       ->capture_default_str();
-  calibrate->add_flag("--replay", flags->options.replay,
-                      "say how far motion that was held out is from its open-loop replay");
-  calibrate->add_flag("--strict", flags->strict,
-                      "exit status 3 if the findings should not be trusted");
-  SetAction(*calibrate, action,
-            [flags, line](Process& process) { return CalibrateLogs(process, *flags, line); });
+  auto* replay =
+      calibrate->add_flag("--replay", flags->options.replay,
+                          "say how far motion that was held out is from its open-loop replay");
+  auto* strict = calibrate->add_flag("--strict", flags->strict,
+                                     "exit status 3 if the findings should not be trusted");
+  // What would have no effect.
+  sbc->excludes(model, method, output, report, urdf, horizons, budget, discrepancy, no_residual,
+                replay);
+  model->excludes(report, horizons, budget, discrepancy, no_residual, replay, strict, threads);
+  const auto calibrates = [flags, line](Process& process) {
+    return CalibrateLogs(process, *flags, line);
+  };
+  SetAction(*calibrate, action, calibrates, [flags]() -> std::string {
+    const std::string& asked = flags->options.method;
+    const bool other = !flags->model.empty() && asked != "auto" && asked != "laplace";
+    return other ? "--model is calibrated by laplace: no other --method" : "";
+  });
 }
 
 void AddExcite(CLI::App& app, Action& action) {
@@ -139,7 +157,7 @@ void AddExcite(CLI::App& app, Action& action) {
   excite->add_option("--posterior", flags->posterior,
                      "a posterior.json to start from, without its residual; default: the prior");
   excite->add_option("--png", flags->png, "draw the best one as a strip of snapshots");
-  SetAction(*excite, action, [flags](Process& process) { return Excite(process, *flags); });
+  SetAction(*excite, action, [flags] { return Excite(*flags); });
 }
 
 void AddTrain(CLI::App& app, const std::string& line, Action& action) {
@@ -212,7 +230,7 @@ void AddExportModel(CLI::App& app, Action& action) {
   export_model->add_option("--seed", flags->seed, "of all random numbers")
       ->check(SeedRange())
       ->capture_default_str();
-  SetAction(*export_model, action, [flags](Process&) { return ExportModel(*flags); });
+  SetAction(*export_model, action, [flags] { return ExportModel(*flags); });
 }
 
 void AddServeModel(CLI::App& app, Action& action) {

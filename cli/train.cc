@@ -145,7 +145,9 @@ class Training {
           saved = clock_.seconds();
         }
       }
+      if (trainer_.steps() > before) Save(trainer_.state(), false);  // would be lost below
     }
+    process_.EndAtOnce();  // what follows does not look whether it is to stop
     // A longer run goes on from here, as if it had never ended.
     Conclude(sample, trainer_.state());
     return 0;

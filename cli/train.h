@@ -32,7 +32,8 @@ struct TrainFlags {
 /// `plumb train`: trains a policy on simulators drawn from a distribution, without any other
 /// process, and says how it does on simulators held out. An interrupted run leaves a checkpoint,
 /// from which the same command goes on to the same bits.
-/// @return exit status: 0, or 130 if it was interrupted. Has threads of its own; call it from one.
+/// @return exit status: 0; or 130 if it was interrupted, which ends the process at once while it
+/// looks how the policy does. Has threads of its own; call it from one.
 /// @throws std::invalid_argument or std::runtime_error, one line for people: robot, distribution,
 /// files, simulations that cannot be used.
 int Train(Process& process, TrainFlags flags);

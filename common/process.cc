@@ -4,8 +4,6 @@
 #include <poll.h>
 #include <signal.h>
 #include <spdlog/pattern_formatter.h>
-#include <spdlog/sinks/base_sink.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
@@ -15,16 +13,19 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <iostream>
 #include <limits>
 #include <memory>
 #include <stdexcept>
 
 #include "common/lcm_url.h"
-#include "common/log_limit.h"
 #include "common/nearest_name.h"
 #include "common/outside_text.h"
+#include "common/process_log.h"
+#include "common/process_output.h"
 #include "common/program_version.h"
 #include "common/realtime.h"
 #include "common/service_notice.h"
@@ -35,28 +36,6 @@ namespace {
 
 constexpr std::string_view kVirtual = "virtual:";
 
-/// Messages of the log quote what came from outside.
-class PrintableFormatter : public spdlog::formatter {
- public:
-  explicit PrintableFormatter(std::unique_ptr<spdlog::formatter> inner)
-      : inner_(std::move(inner)) {}
-
-  void format(const spdlog::details::log_msg& message, spdlog::memory_buf_t& line) override {
-    const std::string text = Printable({message.payload.data(), message.payload.size()});
-    spdlog::details::log_msg printable = message;
-    printable.payload = text;
-    inner_->format(printable, line);
-    message.color_range_start = printable.color_range_start;
-    message.color_range_end = printable.color_range_end;
-  }
-  std::unique_ptr<spdlog::formatter> clone() const override {
-    return std::make_unique<PrintableFormatter>(inner_->clone());
-  }
-
- private:
-  std::unique_ptr<spdlog::formatter> inner_;
-};
-
 /// The service manager is the whole process's, as its log is. In real time only: virtual time may
 /// stand still for as long as somebody computes.
 ServiceNotice& Notice() {
@@ -64,10 +43,17 @@ ServiceNotice& Notice() {
   return notice;
 }
 
-int BlockStopSignals() {
+constexpr int kStopSignals[] = {SIGINT, SIGTERM, SIGHUP};
+
+sigset_t StopSignals() {
   sigset_t set;
   sigemptyset(&set);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&set, signal);
+  for (const int signal : kStopSignals) sigaddset(&set, signal);
+  return set;
+}
+
+int BlockStopSignals() {
+  const sigset_t set = StopSignals();
   // Before any thread exists (LCM starts one), so that all of them inherit the mask.
   sigprocmask(SIG_BLOCK, &set, nullptr);
   ::signal(SIGPIPE, SIG_IGN);
@@ -77,32 +63,6 @@ int BlockStopSignals() {
   if (fd < 0) throw std::runtime_error("signalfd failed");
   return fd;
 }
-
-/// Writes to standard error what LogLimit lets through. What a person has asked for in detail, from
-/// debug on, is not limited.
-class LimitedSink : public spdlog::sinks::base_sink<std::mutex> {
- private:
-  void sink_it_(const spdlog::details::log_msg& line) override {
-    if (line.level < spdlog::level::info) return out_.log(line);
-    const std::optional<int64_t> held_back =
-        limit_.Admit({line.payload.data(), line.payload.size()}, clock_.Now());
-    if (!held_back) return;
-    if (*held_back > 0) {
-      const std::string note = fmt::format("{} lines like the next one are left out", *held_back);
-      out_.log({line.logger_name, line.level, note});
-    }
-    out_.log(line);
-  }
-  void flush_() override { out_.flush(); }
-  void set_pattern_(const std::string& pattern) override { out_.set_pattern(pattern); }
-  void set_formatter_(std::unique_ptr<spdlog::formatter> formatter) override {
-    out_.set_formatter(std::move(formatter));
-  }
-
-  spdlog::sinks::stderr_color_sink_st out_;
-  LogLimit limit_;
-  const Clock clock_;
-};
 
 }  // namespace
 
@@ -135,6 +95,12 @@ Messenger& Process::messenger() {
     messenger_->Become(Identity(name_, key_, clock_, reach, run_));
   }
   return *messenger_;
+}
+
+void Process::EndAtOnce() {
+  for (const int signal : kStopSignals) ::signal(signal, [](int) { _exit(130); });
+  const sigset_t set = StopSignals();
+  sigprocmask(SIG_UNBLOCK, &set, nullptr);
 }
 
 bool Process::stopping() {
@@ -225,10 +191,10 @@ void SuggestCommand(const CLI::App& app) {
                            unknown.front(), NearestName(unknown.front(), names));
 }
 
-}  // namespace
-
-int Run(const std::string& name, const std::string& description, int argc, char** argv,
-        const std::function<void(CLI::App&)>& add_flags, const std::function<int(Process&)>& body) {
+// @return exit status.
+int ParseAndRun(const std::string& name, const std::string& description, int argc, char** argv,
+                const std::function<void(CLI::App&)>& add_flags,
+                const std::function<int(Process&)>& body) {
   const PrintableStream out(std::cout), err(std::cerr);
   CLI::App app{description, name};
   std::string lcm_url = ResolvedLcmUrl("");
@@ -248,7 +214,9 @@ int Run(const std::string& name, const std::string& description, int argc, char*
                  "sign what is said on LCM with this key, and believe nothing else; stopping needs "
                  "none (plumb key makes one)");
   app.add_option("--run", run, "the run that this process is part of, as plumb launch numbers it");
-  app.add_option("--log-level", level, "trace, debug, info, warning, error")->capture_default_str();
+  app.add_option("--log-level", level, "log nothing less important than this")
+      ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error"}))
+      ->capture_default_str();
   app.add_option("--parent", parent, "stop when this process, which started us, is gone");
   app.add_option("--nice", niceness, "give way to the others: 0 to 19")->check(CLI::Range(0, 19));
   app.set_version_flag("--version", VersionLine(name));
@@ -280,6 +248,19 @@ int Run(const std::string& name, const std::string& description, int argc, char*
     spdlog::error("{}", error.what());
     return 1;
   }
+}
+
+}  // namespace
+
+int Run(const std::string& name, const std::string& description, int argc, char** argv,
+        const std::function<void(CLI::App&)>& add_flags, const std::function<int(Process&)>& body) {
+  const WriteErrors printed(std::cout);
+  const int status = ParseAndRun(name, description, argc, argv, add_flags, body);
+  // Whoever closes a pipe, as `| head` does, has what he wants.
+  if (printed.first() == 0 || printed.first() == EPIPE) return status;
+  std::cerr << fmt::format("{}: standard output cannot be written: {}\n", name,
+                           std::strerror(printed.first()));
+  return 1;
 }
 
 }  // namespace plumb

@@ -58,6 +58,9 @@ class Process {
 
   /// Becomes readable when the process is asked to stop (SIGINT, SIGTERM, SIGHUP). For ppoll.
   int stop_fd() const { return stop_fd_; }
+  /// From now on a stop signal, and one that has come already, ends the process at once, with exit
+  /// status 130: for what does not look whether it is to stop, and leaves whole files or none.
+  void EndAtOnce();
   /// True once the process has been asked to stop. Never blocks.
   bool stopping();
   /// Sleeps until LCM has messages, one of `fds` (which may be -1) is readable, the process is
@@ -101,8 +104,9 @@ std::string VersionLine(const std::string& name);
 
 /// Parses the flags (the common ones and `add_flags`), starts the log, blocks the stop signals,
 /// runs `body`, and turns any exception into one clear line and exit status 1. Usage errors exit
-/// with 2. Of the log's lines that are alike, whoever provokes them, no more are written than
-/// LogLimit lets through.
+/// with 2. What was printed and could not be written is an error, too, unless it is that nobody
+/// reads a pipe any more. Of the log's lines that are alike, whoever provokes them, no more are
+/// written than LogLimit lets through.
 int Run(const std::string& name, const std::string& description, int argc, char** argv,
         const std::function<void(CLI::App&)>& add_flags, const std::function<int(Process&)>& body);
 

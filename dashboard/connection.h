@@ -3,6 +3,7 @@
 #include <list>
 #include <memory>
 
+#include "dashboard/page.h"
 #include "dashboard/server.h"
 
 // What requests and WebSockets share. All of it on the context's thread.
@@ -37,7 +38,7 @@ struct Server::Parts {
   const RobotDescription robot;
   Gateway& gateway;
   const Setting setting;
-  const Page page;
+  const PageFolder page;
   Places viewers;  // the oldest first
   bool ended = false;
 };

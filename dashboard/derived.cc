@@ -59,12 +59,12 @@ Derived::Derived(const RobotDescription& robot, Topics& topics)
   }
 }
 
-void Derived::OnState(const robot_state_t& state, int64_t now) {
+void Derived::OnState(const robot_state_t& state, int64_t utime, int64_t now) {
   if (prediction_) prediction_->OnState(state);
   const Eigen::VectorXd q =
       Eigen::VectorXd::Map(state.q.data(), static_cast<Eigen::Index>(state.q.size()));
   if (q.size() != robot_.num_positions() || !q.allFinite()) return;
-  utime_ = state.utime;
+  utime_ = utime;
   q_ = q;
   const bool sees = (topics_.watched(scenes_) || topics_.watched(frames_)) && now >= next_scene_;
   const bool compares = topics_.watched(predictions_) && now >= next_prediction_;
@@ -72,15 +72,13 @@ void Derived::OnState(const robot_state_t& state, int64_t now) {
   const auto predicted = prediction_ ? prediction_->Predict() : std::nullopt;
   if (compares && predicted) {
     next_prediction_ = now + kPredictionPeriod;
-    topics_.Publish(predictions_, state.utime, predicted->Json());
+    topics_.Publish(predictions_, utime, predicted->Json());
   }
   if (sees) {
     next_scene_ = now + kScenePeriod;
-    if (topics_.watched(frames_))
-      topics_.Publish(frames_, state.utime, scene_.FrameJson(state.utime, q));
+    if (topics_.watched(frames_)) topics_.Publish(frames_, utime, scene_.FrameJson(utime, q));
     if (topics_.watched(scenes_))
-      topics_.Publish(scenes_, state.utime,
-                      scene_.Json(state.utime, q, predicted ? &predicted->q : nullptr));
+      topics_.Publish(scenes_, utime, scene_.Json(utime, q, predicted ? &predicted->q : nullptr));
   }
 }
 

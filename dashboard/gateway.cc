@@ -180,7 +180,7 @@ void Gateway::Use(const std::string& channel, std::span<const uint8_t> message, 
                   const Moment& moment) {
   if (channel == "ROBOT_STATE") {
     state_ = Decode<robot_state_t>(message);
-    if (state_) derived_.OnState(*state_, moment.now);
+    if (state_) derived_.OnState(*state_, Utime(moment), moment.now);
   } else if (channel == "DRIVER_STATUS") {
     if (const auto status = Decode<driver_status_t>(message)) wishes_.OnStatus(*status, moment.now);
   } else if (channel == "PLACE_ROBOT") {

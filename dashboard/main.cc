@@ -1,7 +1,6 @@
 // plumb-dashboard: everything on LCM -> a page for browsers, Foxglove and Lichtblick; what people
 // ask for there -> DRIVER_REQUEST.
 
-#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 
@@ -16,6 +15,7 @@
 
 #include "common/examples.h"
 #include "common/process.h"
+#include "dashboard/page.h"
 #include "dashboard/server.h"
 
 namespace plumb {
@@ -69,8 +69,7 @@ class Dashboard {
         stop_(context_, process.stop_fd()),
         pause_(context_),
         tick_(context_) {
-    const bool six = address_.find(':') != std::string::npos;
-    url_ = fmt::format("http://{}:{}/", six ? "[" + address_ + "]" : address_, server_.port());
+    url_ = server_.url() + "/";
     if (!token_.empty()) url_ += "?token=" + token_;
   }
   ~Dashboard() {
@@ -112,7 +111,6 @@ class Dashboard {
     setting.page = flags.page.empty() ? DefaultPageFolder() : std::filesystem::path(flags.page);
     setting.moment = [this] { return Now(); };
     token_ = setting.access.token;
-    address_ = setting.listen.address;
     return setting;
   }
 
@@ -175,7 +173,7 @@ class Dashboard {
   asio::io_context context_{1};
   Gateway gateway_;
   std::unique_ptr<Messenger::Subscription> all_;
-  std::string token_, address_, url_;
+  std::string token_, url_;
   Server server_;
   asio::posix::stream_descriptor lcm_, stop_;
   asio::steady_timer pause_, tick_;

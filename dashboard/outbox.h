@@ -21,7 +21,7 @@ class Outbox {
 
   enum class Kind {
     kControl,  ///< the conversation itself: never goes
-    kHistory,  ///< what was before the client came; others hold it, too, so that it costs nothing
+    kHistory,  ///< what was before the client came; the history holds it, and no client does
     kSlow,
     kFast  ///< goes first where there is no room
   };
@@ -44,9 +44,10 @@ class Outbox {
   /// The run's time is this from here on [us], also where it was later before.
   void SetTime(int64_t utime);
   bool empty() const { return items_.empty(); }
-  /// The next; before a message of a later time than was told, unless it is of history, that time
-  /// as a frame of its own: Foxglove stamps what it hears with the time that it was told last.
-  Item Pop();
+  /// The next, none if there is none; before a message of a later time than was told, unless it is
+  /// of history, that time as a frame of its own: Foxglove stamps what it hears with the time that
+  /// it was told last.
+  std::optional<Item> Pop();
   /// Nothing more of a subscription that has ended.
   void Forget(uint32_t subscription);
   /// Messages that had to go.
@@ -55,10 +56,18 @@ class Outbox {
   bool hopeless() const { return control_bytes_ > kMaxControlBytes; }
 
  private:
+  struct Waiting {
+    Item item;  // without its payload if it is of history
+    // Which may have been forgotten before a slow client fetches it: whoever came now would not
+    // hear of it either.
+    std::weak_ptr<const std::string> history;
+
+    bool forgotten() const { return item.kind == Kind::kHistory && history.expired(); }
+  };
   void MakeRoom();
   void Account(const Item& item, bool added);
 
-  std::deque<Item> items_;
+  std::deque<Waiting> items_;
   size_t bytes_ = 0, control_bytes_ = 0;
   int64_t dropped_ = 0;
   int64_t told_ = std::numeric_limits<int64_t>::min();  // [us] the run's time

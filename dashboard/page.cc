@@ -44,7 +44,7 @@ std::optional<std::string> Read(const fs::path& file) {
 
 }  // namespace
 
-std::optional<Page::File> Page::Find(std::string_view path, bool gzip) const {
+std::optional<PageFolder::File> PageFolder::Find(std::string_view path, bool gzip) const {
   const bool first = path == "/";
   const std::string_view name =
       first ? "index.html" : path.substr(std::min<size_t>(1, path.size()));

@@ -8,7 +8,7 @@
 namespace plumb {
 
 /// The built page: the files of one folder. Not thread-safe.
-class Page {
+class PageFolder {
  public:
   struct File {
     std::string type;  ///< "text/html; charset=utf-8"
@@ -16,7 +16,7 @@ class Page {
     bool gzipped;
   };
 
-  explicit Page(std::filesystem::path folder) : folder_(std::move(folder)) {}
+  explicit PageFolder(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   /// @param path of a URL, without its query: "/", which is index.html, or "/page.js".
   /// @param gzip whether it may be the compressed file beside it, page.js.gz, if there is one.

@@ -7,11 +7,13 @@
 
 namespace plumb {
 
-/// A distribution of parameters beside its prior, for people to look at: moments, quantiles, and
-/// kDraws draws of each, in physical units; the same distribution, the same draws. A parameter is
-/// "determined" if its standard deviation, in coordinates, is below 0.7 of the prior's, as
-/// Identifiability has it. Thread-safe. @return {"utime":..,"iteration":..,"parameters":[..],...}
 inline constexpr int kPosteriorDraws = 200;
+
+/// A distribution of parameters beside its prior, for people to look at: moments, quantiles, and
+/// kPosteriorDraws draws of each, in physical units; the same distribution, the same draws. A
+/// parameter is "determined" if its standard deviation, in coordinates, is below 0.7 of the
+/// prior's, as Identifiability has it. Thread-safe.
+/// @return {"utime":..,"iteration":..,"parameters":[..],...}
 std::string PosteriorJson(const ParameterDistribution& distribution,
                           const ParameterDistribution& prior, int64_t utime);
 

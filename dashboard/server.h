@@ -1,7 +1,7 @@
 #pragma once
 
 #include <boost/asio/io_context.hpp>
-#include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
@@ -9,7 +9,6 @@
 #include "common/listen_address.h"
 #include "dashboard/access.h"
 #include "dashboard/gateway.h"
-#include "dashboard/page.h"
 #include "http/server.h"
 
 namespace plumb {
@@ -34,7 +33,7 @@ class Server {
          Setting setting);
   ~Server();  ///< closes all connections
 
-  uint16_t port() const { return http_.port(); }
+  std::string url() const { return http_.url(); }
   /// Whether somebody who looks on has not been sent everything yet.
   bool sending() const;
 

@@ -63,8 +63,9 @@ std::string Topics::WhyNot(const Viewer& viewer, uint32_t id, uint32_t topic) co
     return fmt::format("channelId: there is no channel {}", topic);
   if (viewer.subscriptions.contains(id))
     return fmt::format("id: there is a subscription {} already", id);
-  if (viewer.subscriptions.size() >= kMaxSubscriptions)
-    return fmt::format("subscriptions: {} are enough", kMaxSubscriptions);
+  const auto topic_of = [](const auto& subscription) { return subscription.second; };
+  if (std::ranges::find(viewer.subscriptions, topic, topic_of) != viewer.subscriptions.end())
+    return fmt::format("channelId: {} is subscribed already", topic);
   return "";
 }
 

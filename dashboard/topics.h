@@ -20,7 +20,6 @@ namespace plumb {
 class Topics {
  public:
   static constexpr size_t kMaxTopics = 200;
-  static constexpr size_t kMaxSubscriptions = 400;  ///< of a viewer
 
   enum class Keep {
     kNewest,  ///< of what is fast: whoever comes late hears what `newest` gives
@@ -56,7 +55,8 @@ class Topics {
   size_t viewers() const { return viewers_.size(); }
   int64_t dropped() const;  ///< for viewers that are there or have left
 
-  /// What is kept comes first, in the order in which it was said.
+  /// What is kept comes first, in the order in which it was said. A viewer has a topic once, as
+  /// Foxglove's protocol wants it: no more of what is kept waits for him than there is.
   /// @throws std::runtime_error, one line for the client, about the first that cannot be had; the
   /// others hold.
   void Subscribe(Viewer& viewer, std::span<const ClientMessage::Subscription> subscriptions);

@@ -97,8 +97,9 @@ class ViewerConnection : public Connection, public std::enable_shared_from_this<
   void Send() {
     if (viewer_.outbox.hopeless())  // whoever has just put something in is still at it
       return asio::post(parts_->context, [self = shared_from_this()] { self->Close(); });
-    if (sending_ || viewer_.outbox.empty()) return;
+    if (sending_) return;
     sending_ = viewer_.outbox.Pop();
+    if (!sending_) return;
     socket_.binary(sending_->binary);
     if (sending_->is_message()) head_ = MessageHeadOf(sending_->subscription, *sending_->utime);
     const std::array<asio::const_buffer, 2> buffers{

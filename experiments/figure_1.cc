@@ -21,6 +21,7 @@
 #include "experiments/jobs.h"
 #include "experiments/options.h"
 #include "experiments/population_weights.h"
+#include "experiments/provenance.h"
 #include "plot/svg.h"
 
 namespace plumb {
@@ -161,18 +162,13 @@ struct Shown {
   VectorXd density;
 };
 
-constexpr char kStyle[] = R"(<style>
-text { font: 12px system-ui, "Segoe UI", Helvetica, Arial, sans-serif; fill: #1b2330; }
-text.tick { font-size: 11px; fill: #5b6676; } text.name { font-weight: 600;
-  } text.muted { fill: #5b6676; }
-.paper { fill: #ffffff; } .frame { fill: none; stroke: #d8dee6; }
-.grid { fill: none; stroke: #e8ecf1; }
+constexpr char kRules[] =
+    R"(text.muted { fill: #5b6676; }
 .truth { fill: none; stroke: #1b2330; stroke-width: 1.2; stroke-dasharray: 4 3; }
 .line { stroke-width: 1.8; } .area { stroke: none; fill-opacity: 0.18; }
 .squared.line { fill: none; stroke: #b3261e; } .squared.area { fill: #b3261e; }
 .population.line { fill: none; stroke: #1f5fbf; } .population.area { fill: #1f5fbf; }
 .mixture.line { fill: none; stroke: #1a7f47; } .mixture.area { fill: #1a7f47; }
-</style>
 )";
 
 // A panel for each method, one above the other: their heights differ too much for one.
@@ -213,8 +209,7 @@ std::string Draw(const VectorXd& grid, const std::vector<Shown>& curves) {
     svg.Text(kLeft + 33, top - 8, curve.name, "name", Svg::Anchor::kStart);
     svg.Text(kRight, top - 8, curve.words, "muted", Svg::Anchor::kEnd);
   }
-  std::string text = svg.Print();
-  return text.insert(text.find("</title>") + 9, kStyle);
+  return svg.PrintAlone(kRules);
 }
 
 // A method's rows: what it found, as a density, and in numbers that all rows repeat.
@@ -249,7 +244,8 @@ int MakeFigure(Process& process, const std::filesystem::path& output, uint64_t s
   const std::vector<ToyTransition> transitions = Record(quick ? 20 : 400, seed);
   const VectorXd grid = VectorXd::LinSpaced(321, -2, 2);
   const Ranks ranks;
-  Results results(output / "figure_1.csv", fmt::format("seed {}{}", seed, quick ? ", quick" : ""),
+  Results results(output / "figure_1.csv",
+                  fmt::format("seed {}{}, {}", seed, quick ? ", quick" : "", Provenance({})),
                   {"method"}, {"xi", "density", "near_light", "near_heavy", "mean", "sd"}, ranks);
   const std::vector<Job> jobs = {
       {"squared_error", 1, 0,

@@ -21,6 +21,7 @@
 #include "experiments/jobs.h"
 #include "experiments/n_step_error.h"
 #include "experiments/options.h"
+#include "experiments/provenance.h"
 #include "experiments/recording.h"
 #include "plot/curves.h"
 
@@ -156,8 +157,9 @@ std::string Sentence(const Options& options, const PaperTask& task, const Chart&
 }
 
 std::string SettingsOf(const Options& options) {
-  return fmt::format("iterations {}, noise {}, drawn from {}{}", options.iterations, options.noise,
-                     Key(options.hidden), options.quick ? ", quick" : "");
+  return fmt::format("iterations {}, noise {}, drawn from {}{}, {}", options.iterations,
+                     options.noise, Key(options.hidden), options.quick ? ", quick" : "",
+                     Provenance(LoadTasks(options.robots, options.hidden)));
 }
 
 int MakeFigure(Process& process, const Options& options) {

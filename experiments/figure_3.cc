@@ -17,9 +17,11 @@
 
 #include "common/atomic_file.h"
 #include "common/examples.h"
+#include "common/median.h"
 #include "experiments/jobs.h"
 #include "experiments/options.h"
 #include "experiments/oracle.h"
+#include "experiments/provenance.h"
 #include "experiments/recording.h"
 #include "experiments/simulated_system.h"
 #include "plot/curves.h"
@@ -88,14 +90,13 @@ Chart Draw(const ExperimentOptions& options, const PaperTask& task, const Result
   return chart;
 }
 
-// One column of the table after k iterations, of all runs, ascending.
+// One column of the table after k iterations, of all runs.
 std::vector<double> Column(const ExperimentOptions& options, const PaperTask& task,
                            CalibrationStrategy strategy, const Results& results, int k,
                            size_t column) {
   std::vector<double> values;
   for (int run = 1; run <= options.runs; ++run)
     values.push_back(results.Of(KeyOf(task, strategy, run))[static_cast<size_t>(k)][column]);
-  std::sort(values.begin(), values.end());
   return values;
 }
 
@@ -121,7 +122,7 @@ std::string Sentence(const ExperimentOptions& options, const PaperTask& task,
     for (const int k : shown) {
       const std::vector<double> values = Column(options, task, strategy, results, k, kReturn);
       text += fmt::format("{:>22}", fmt::format("{:.0f} ({:.0f}, {:.0f})", Mean(values),
-                                                values[values.size() / 2], values.front()));
+                                                Median(values), *std::ranges::min_element(values)));
     }
     if (Learns(strategy)) {
       text += fmt::format("{:>9.2g} %", 100 * Mean(Column(options, task, strategy, results,
@@ -146,8 +147,9 @@ std::string Sentence(const ExperimentOptions& options, const PaperTask& task,
 }
 
 std::string SettingsOf(const ExperimentOptions& options) {
-  return fmt::format("iterations {}, drawn from {}{}", options.iterations, Key(options.hidden),
-                     options.quick ? ", quick" : "");
+  return fmt::format("iterations {}, drawn from {}{}, {}", options.iterations, Key(options.hidden),
+                     options.quick ? ", quick" : "",
+                     Provenance(LoadTasks(options.robots, options.hidden)));
 }
 
 int MakeFigure(Process& process, const ExperimentOptions& options) {

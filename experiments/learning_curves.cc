@@ -22,6 +22,7 @@
 #include "common/progress_line.h"
 #include "common/time_units.h"
 #include "experiments/options.h"
+#include "experiments/provenance.h"
 #include "experiments/results.h"
 #include "plot/svg.h"
 #include "robot/parameter_distribution.h"
@@ -127,16 +128,11 @@ Curve Train(const RobotDescription& robot, const ParameterDistribution& distribu
   return curve;
 }
 
-constexpr char kStyle[] = R"(<style>
-text { font: 12px system-ui, "Segoe UI", Helvetica, Arial, sans-serif; fill: #1b2330; }
-text.tick { font-size: 11px; fill: #5b6676; } text.muted { fill: #5b6676; }
-.paper { fill: #ffffff; } .frame { fill: none; stroke: #d8dee6; }
-.grid { fill: none; stroke: #e8ecf1; }
-.band { fill: #1f5fbf; fill-opacity: 0.14; stroke: none; }
+constexpr char kRules[] =
+    R"(.band { fill: #1f5fbf; fill-opacity: 0.14; stroke: none; }
 .seed { fill: none; stroke: #1f5fbf; stroke-opacity: 0.35; }
 .dot { fill: #1f5fbf; }
 .mean { fill: none; stroke: #1f5fbf; stroke-width: 2.2; }
-</style>
 )";
 
 std::string Draw(const Curves& curves, double steps, const std::string& title) {
@@ -184,8 +180,7 @@ std::string Draw(const Curves& curves, double steps, const std::string& title) {
   }
   for (size_t i = 0; i < grid.size(); ++i) line.emplace_back(x.Pixel(grid[i]), y.Pixel(mean[i]));
   svg.Path(line, "mean");
-  std::string text = svg.Print();
-  return text.insert(text.find("</title>") + 9, kStyle);
+  return svg.PrintAlone(kRules);
 }
 
 template <class F>
@@ -208,8 +203,8 @@ int RunSeeds(Process& process, const Options& options) {
 
   const std::filesystem::path folder = options.output;
   const std::string settings =
-      fmt::format("{} {:016x}, {} steps, {} simulators{}", robot.name, robot.fingerprint, steps,
-                  options.distribution, options.paper ? ", the paper's settings" : "");
+      fmt::format("{}, {} steps, {} simulators{}, {}", robot.name, steps, options.distribution,
+                  options.paper ? ", the paper's settings" : "", Provenance({robot}));
   Results results(folder / "learning_curves.csv", settings, {"seed"},
                   {"steps", "mean_return", "evaluation_return", "seconds"});
   Curves curves;

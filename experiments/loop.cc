@@ -94,9 +94,11 @@ std::unique_ptr<Trainer> Loop::TrainFirst(const std::string& name,
 LoopResult Loop::Run(RealSystem& real, const LoopSettings& settings,
                      const std::function<void(double)>& progress) {
   ParameterDistribution distribution = FirstDistribution(settings.strategy, model_, truth_);
+  RobotDescription calibrated = model_;
+  calibrated.calibration.residual = model_.calibration.residual && settings.residual;
   const std::unique_ptr<SimOpt> simopt =
       Learns(settings.strategy)
-          ? MakeSimOpt(settings.strategy, model_, settings.seed, settings.threads)
+          ? MakeSimOpt(settings.strategy, calibrated, settings.seed, settings.threads)
           : nullptr;
   const double all = settings.first_updates + settings.iterations * settings.next_updates;
   const double first = settings.first_updates / all, next = settings.next_updates / all;
@@ -142,7 +144,7 @@ LoopResult Loop::Run(RealSystem& real, const LoopSettings& settings,
           component.covariance *= settings.tempering;
       }
       if (settings.accept) {
-        const bool right = simopt && model_.calibration.residual && !simopt->state().residual;
+        const bool right = simopt && calibrated.calibration.residual && !simopt->state().residual;
         const double scatter = trainer->ScatterOfStarts(distribution.Mean());
         if (!incumbent) incumbent = trainer->policy();
         const auto simulated = [&](const GaussianPolicy& policy) {

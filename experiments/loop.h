@@ -24,6 +24,8 @@ struct LoopSettings {
   /// of an iteration's steps, the first so many try the policy, without exploration, in as many
   /// episodes as it takes; 0 = none
   double trial_share = 0;
+  /// What the simulators lack is looked for, where the robot's file asks for it.
+  bool residual = true;
   /// Random forces that are trained with, as shares of the effort limits; 0 = none.
   double forces = 0;
   /// Factor of the posterior's covariance: a likelihood to the power of 1 / factor.

@@ -11,7 +11,8 @@ void Resume(Trainer& trainer, uint64_t seed, uint64_t identity, const std::strin
   const std::optional<Checkpoint> checkpoint = LoadCheckpoint(file);
   if (!checkpoint) return;
   if (checkpoint->identity != identity || checkpoint->seed != seed)
-    throw CheckpointError(file + ": of another robot or seed: delete it, or give another --output");
+    throw CheckpointError(
+        file + ": of another robot, seed or version: delete it, or give another --output");
   trainer.Restore(TrainerStateOf(*checkpoint));
 }
 

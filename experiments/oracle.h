@@ -20,7 +20,7 @@ struct Oracle {
 /// in 30 episodes without exploration; the best one is the result.
 /// @param checkpoint the file where it is left after each judgement, and from which it goes on with
 /// the same bits. It stays: who has lost the result has it again in no time.
-/// @param identity of the reality and the model.
+/// @param identity of the reality, the model and the program.
 /// @param progress told the share of kMostUpdates that is done; may throw to break off.
 /// @throws as Trainer; CheckpointError, also if the checkpoint is of another identity or seed.
 Oracle TrainOracle(const RobotDescription& model, const SimulationFactory& reality, uint64_t seed,

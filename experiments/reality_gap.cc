@@ -17,12 +17,14 @@
 #include "common/atomic_file.h"
 #include "common/examples.h"
 #include "common/hash.h"
+#include "common/median.h"
 #include "experiments/bus_robot.h"
 #include "experiments/bus_simulation.h"
 #include "experiments/jobs.h"
 #include "experiments/loop.h"
 #include "experiments/options.h"
 #include "experiments/oracle.h"
+#include "experiments/provenance.h"
 #include "plot/curves.h"
 #include "sim/parameters.h"
 
@@ -59,6 +61,20 @@ constexpr std::array<Gap, 10> kGaps{
       "pendulum/worn_fitted.toml"},
      {"weak", "worn pendulum, weak motor", "pendulum/worn_weak.toml", "pendulum/weak.toml",
       "pendulum/worn_fitted.toml"}}};
+
+RobotDescription Load(const std::string& robots, const std::string& file) {
+  return LoadRobot((std::filesystem::path(robots) / file).string());
+}
+
+// Whichever gaps are chosen: they share a table.
+std::vector<RobotDescription> AllRobots(const std::string& robots) {
+  std::vector<RobotDescription> all;
+  for (const Gap& gap : kGaps) {
+    for (const char* file : {gap.truth, gap.model, gap.uncertain})
+      all.push_back(Load(robots, file));
+  }
+  return all;
+}
 
 struct Method {
   const char *key, *label;
@@ -131,8 +147,7 @@ Results::Rows RunOracle(const Options& options, const Gap& gap, const RobotDescr
       std::filesystem::path(options.output) / fmt::format("oracle_{}_{}.checkpoint", gap.key, seed);
   const Oracle oracle = TrainOracle(
       model, SimulateBusRobot(truth, model, hidden, seed), seed, options.threads,
-      checkpoint.string(),
-      Hash(fmt::format("{} {} {}", truth.fingerprint, model.fingerprint, model.task.steps)),
+      checkpoint.string(), Hash(fmt::format("{} {}", Provenance({truth, model}), model.task.steps)),
       progress);
   const auto judged =
       Loop::Judge(real, oracle.policy, model.task.steps, options.quick ? 1 : kJudged);
@@ -147,18 +162,14 @@ Results::Rows RunOracle(const Options& options, const Gap& gap, const RobotDescr
 
 Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& method, int run,
                       Remembered& remembered, const std::function<void(double)>& progress) {
-  const auto load = [&](const char* file) {
-    return LoadRobot((std::filesystem::path(options.robots) / file).string());
-  };
   const char* model_file = method.uncertain ? gap.uncertain : gap.model;
-  const RobotDescription truth = load(gap.truth);
-  RobotDescription model = load(model_file);
-  model.calibration.residual = method.residual;
+  const RobotDescription truth = Load(options.robots, gap.truth);
+  RobotDescription model = Load(options.robots, model_file);
   if (options.quick) model.task.steps = std::min(model.task.steps, 40);
   const auto seed = static_cast<uint64_t>(run);
   const Eigen::VectorXd hidden = HiddenParameters(truth, seed);
   if (remembered.run != run) remembered = {run, {}};
-  std::unique_ptr<Loop>& loop = remembered.loops[fmt::format("{} {}", model_file, method.residual)];
+  std::unique_ptr<Loop>& loop = remembered.loops[model_file];
   if (!loop) loop = std::make_unique<Loop>(model, hidden);
   BusRobot real(truth, model, hidden, seed);
   if (method.oracle) return RunOracle(options, gap, truth, model, hidden, seed, real, progress);
@@ -172,6 +183,7 @@ Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& meth
   settings.evaluation_episodes = options.quick ? 1 : kJudged;
   settings.trial_share = method.accept ? kTrialShare : 0;
   settings.accept = method.accept;
+  settings.residual = method.residual;
   settings.forces = method.forces, settings.tempering = method.tempering;
   settings.seed = seed;
   settings.threads = options.threads;
@@ -200,11 +212,6 @@ std::vector<double> Column(const Options& options, const Gap& gap, const Method&
     values.push_back(results.Of(KeyOf(gap, method, run))[static_cast<size_t>(iteration)][column]);
   std::sort(values.begin(), values.end());
   return values;
-}
-
-double Median(const std::vector<double>& sorted) {
-  const size_t n = sorted.size();
-  return (sorted[(n - 1) / 2] + sorted[n / 2]) / 2;
 }
 
 // Of each iteration the median, and a band from the worst run to the best.
@@ -254,7 +261,8 @@ int Compare(Process& process, const Options& options) {
   const Ranks ranks;
   Results results(
       folder / "reality_gap.csv",
-      fmt::format("iterations {}{}", options.iterations, options.quick ? ", quick" : ""),
+      fmt::format("iterations {}{}, {}", options.iterations, options.quick ? ", quick" : "",
+                  Provenance(AllRobots(options.robots))),
       {"gap", "method", "run"},
       {"iteration", "robot_return", "worst_episode", "newest_return", "deployed",
        "simulated_return", "discrepancy", "residual", "transitions", "robot_seconds"},

@@ -32,6 +32,12 @@ RobotDescription LoadTask(const std::string& robots, const PaperTask& task, Hidd
   return LoadRobot((std::filesystem::path(robots) / file).string());
 }
 
+std::vector<RobotDescription> LoadTasks(const std::string& robots, Hidden hidden) {
+  std::vector<RobotDescription> tasks;
+  for (const PaperTask& task : kPaperTasks) tasks.push_back(LoadTask(robots, task, hidden));
+  return tasks;
+}
+
 Eigen::VectorXd DrawHidden(const RobotDescription& robot, Hidden hidden, uint64_t seed) {
   if (hidden != Hidden::kPrior) return HiddenParameters(robot, seed);
   Random random(seed, {kHiddenStream});

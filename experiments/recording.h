@@ -31,6 +31,7 @@ std::string Key(Hidden hidden);  ///< "paper", "gym", "prior"
 
 /// The robot of a task, with the prior that calibrations begin with.
 RobotDescription LoadTask(const std::string& robots, const PaperTask& task, Hidden hidden);
+std::vector<RobotDescription> LoadTasks(const std::string& robots, Hidden hidden);  ///< of both
 
 /// Parameters of "the real robot". @return physical units, order of robot.parameters.
 Eigen::VectorXd DrawHidden(const RobotDescription& robot, Hidden hidden, uint64_t seed);

@@ -31,6 +31,10 @@ std::optional<std::string> Read(const std::filesystem::path& file, const Ranks& 
   return text;
 }
 
+// A number as the table has it: whoever goes on without a break decides by the same numbers as
+// whoever reads the table.
+std::string Written(double number) { return fmt::format("{:.8g}", number); }
+
 }  // namespace
 
 Results::Results(std::filesystem::path file, const std::string& settings,
@@ -86,6 +90,9 @@ void Results::Arrange(const std::vector<std::string>& keys) {
 
 void Results::Add(const std::string& key, Rows rows) {
   if (Has(key)) throw std::invalid_argument("the table has '" + key + "' already");
+  for (std::vector<double>& row : rows) {
+    for (double& number : row) number = std::strtod(Written(number).c_str(), nullptr);
+  }
   index_[key] = groups_.size();
   groups_.emplace_back(key, std::move(rows));
   if (ranks_.rank() != 0) return;
@@ -97,8 +104,11 @@ void Results::Add(const std::string& key, Rows rows) {
   });
   std::string text = header_ + "\n";
   for (const auto* group : arranged) {
-    for (const std::vector<double>& row : group->second)
-      text += fmt::format("{},{:.8g}\n", group->first, fmt::join(row, ","));
+    for (const std::vector<double>& row : group->second) {
+      text += group->first;
+      for (const double number : row) text += "," + Written(number);
+      text += "\n";
+    }
   }
   WriteAtomically(file_, text);
 }

@@ -34,7 +34,8 @@ class Results {
   /// From now on the table has the rows of these keys in this order, whichever come first, behind
   /// those of others.
   void Arrange(const std::vector<std::string>& keys);
-  /// Called by all ranks, in the same order. @throws std::runtime_error if it cannot be written.
+  /// Called by all ranks, in the same order. Numbers are rounded to the eight digits that the file
+  /// has. @throws std::runtime_error if it cannot be written.
   void Add(const std::string& key, Rows rows);
 
   size_t values() const { return values_; }  ///< columns of Rows

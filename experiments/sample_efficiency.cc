@@ -17,14 +17,17 @@
 #include <cstdint>
 #include <filesystem>
 #include <iostream>
+#include <utility>
 
 #include "common/atomic_file.h"
 #include "common/examples.h"
+#include "common/median.h"
 #include "experiments/budget.h"
 #include "experiments/jobs.h"
 #include "experiments/n_step_error.h"
 #include "experiments/options.h"
 #include "experiments/oracle.h"
+#include "experiments/provenance.h"
 #include "experiments/recording.h"
 #include "experiments/simulated_system.h"
 #include "plot/curves.h"
@@ -217,7 +220,8 @@ std::string Needed(const std::vector<double>& x, const std::vector<double>& y,
 }
 
 std::string SettingsOf(const ExperimentOptions& options) {
-  return fmt::format("drawn from {}{}", Key(options.hidden), options.quick ? ", quick" : "");
+  return fmt::format("drawn from {}{}, {}", Key(options.hidden), options.quick ? ", quick" : "",
+                     Provenance(LoadTasks(options.robots, options.hidden)));
 }
 
 // A strategy's share of the oracle's return on the same robot: the median of the runs, for each
@@ -232,9 +236,7 @@ std::vector<double> Shares(const ExperimentOptions& options, const PaperTask& ta
           ShareOfOracle(results.Of(KeyOf(task, strategy, run))[i][1],
                         results.Of(KeyOf(task, CalibrationStrategy::kOracle, run))[0][1]));
     }
-    std::nth_element(shares.begin(), shares.begin() + static_cast<ptrdiff_t>(shares.size() / 2),
-                     shares.end());
-    medians.push_back(shares[shares.size() / 2]);
+    medians.push_back(Median(std::move(shares)));
   }
   return medians;
 }

@@ -84,7 +84,7 @@ int Compare(const std::string& robot_path, const std::vector<std::string>& folde
     size_t transitions = 0;
     for (const std::string& folder : folders) {
       const std::vector<Rollout> rollouts =
-          LoadRollouts(std::filesystem::path(folder) / "calibration");
+          LoadRollouts(std::filesystem::path(folder) / "calibration", robot);
       if (rollouts.size() <= kHeldOut)
         throw std::runtime_error(folder + ": holds too few roll-outs");
       for (int seed = 1; seed <= (method.prior ? 1 : seeds); ++seed) {
@@ -122,5 +122,8 @@ int main(int argc, char** argv) {
         app.add_option("--csv", csv, "write every single result here");
         plumb::AddExamples(app, {"plumb-step-vs-trajectory robots/pendulum runs/1 runs/2"});
       },
-      [&](plumb::Process&) { return plumb::Compare(robot, folders, seeds, csv); });
+      [&](plumb::Process& process) {
+        process.EndAtOnce();  // nothing is half written
+        return plumb::Compare(robot, folders, seeds, csv);
+      });
 }

@@ -6,6 +6,7 @@
 #include <boost/beast/websocket/rfc6455.hpp>
 #include <list>
 #include <optional>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 
@@ -155,6 +156,10 @@ HttpServer::~HttpServer() {
   }
 }
 
-uint16_t HttpServer::port() const { return parts_->acceptor.local_endpoint().port(); }
+std::string HttpServer::url() const {
+  std::ostringstream url;
+  url << "http://" << parts_->acceptor.local_endpoint();
+  return url.str();
+}
 
 }  // namespace plumb

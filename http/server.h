@@ -43,7 +43,8 @@ class HttpServer {
   HttpServer(asio::io_context& context, Setting setting);
   ~HttpServer();  ///< closes all connections, but for those that have become WebSockets
 
-  uint16_t port() const;
+  /// Where it listens, "http://127.0.0.1:8765", "http://[::1]:8765".
+  std::string url() const;
 
   struct Parts;
 

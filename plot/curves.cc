@@ -1,5 +1,7 @@
 #include "plot/curves.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
@@ -17,23 +19,27 @@ constexpr double kWidth = 380, kHeight = 300, kLeft = 62, kGap = 14, kTop = 30, 
 constexpr size_t kAbreast = 2;
 constexpr double kLegendRow = 20, kLegendColumn = 300;
 
-constexpr char kStyle[] = R"(<style>
-text { font: 12px system-ui, "Segoe UI", Helvetica, Arial, sans-serif; fill: #1b2330; }
-text.tick { font-size: 11px; fill: #5b6676; } text.name { font-weight: 600; }
-.paper { fill: #ffffff; } .frame { fill: none; stroke: #d8dee6; }
-.grid { fill: none; stroke: #e8ecf1; }
-.band { stroke: none; fill-opacity: 0.12; } .line { fill: none; stroke-width: 2; }
+// From the eleventh curve on colours come again, with dashes.
+constexpr size_t kColours = 10;
+constexpr char kRules[] =
+    R"(.band { stroke: none; fill-opacity: 0.12; } .line { fill: none; stroke-width: 2; }
 .line.c0 { stroke: #0072b2; } .line.c1 { stroke: #d55e00; } .line.c2 { stroke: #009e73; }
 .line.c3 { stroke: #cc79a7; }
 .line.c4 { stroke: #5b6676; stroke-dasharray: 5 3; }
 .line.c5 { stroke: #1b2330; stroke-dasharray: 2 3; } .line.c6 { stroke: #e69f00; }
 .line.c7 { stroke: #56b4e9; }
+.line.c8 { stroke: #800000; } .line.c9 { stroke: #4b0082; }
 .band.c0 { fill: #0072b2; } .band.c1 { fill: #d55e00; } .band.c2 { fill: #009e73; }
 .band.c3 { fill: #cc79a7; }
 .band.c4 { fill: #5b6676; } .band.c5 { fill: #1b2330; } .band.c6 { fill: #e69f00; }
 .band.c7 { fill: #56b4e9; }
-</style>
+.band.c8 { fill: #800000; } .band.c9 { fill: #4b0082; }
+.line.again { stroke-dasharray: 8 3 2 3; }
 )";
+
+std::string ClassOf(size_t curve) {
+  return fmt::format("c{}{}", curve % kColours, curve < kColours ? "" : " again");
+}
 
 struct Range {
   double low = std::numeric_limits<double>::infinity(), high = -low;
@@ -74,7 +80,7 @@ void DrawChart(const Chart& chart, double left, double top, Svg& svg) {
             pixel(i, chart.logarithmic ? std::max(curve.low[i], y.lower()) : curve.low[i]));
     }
     for (size_t i = 0; i < curve.x.size(); ++i) line.push_back(pixel(i, curve.middle[i]));
-    const std::string colour = " c" + std::to_string(c);
+    const std::string colour = " " + ClassOf(c);
     if (!band.empty()) svg.Path(band, "band" + colour, true);
     svg.Path(line, "line" + colour);
   }
@@ -97,7 +103,7 @@ std::string DrawCurves(const std::string& title, const std::vector<Chart>& chart
     const size_t row = c / columns;
     const double left = 14 + kLegendColumn * static_cast<double>(c % columns),
                  y = 16 + kLegendRow * static_cast<double>(row);
-    svg.Line(left, y - 4, left + 26, y - 4, "line c" + std::to_string(c));
+    svg.Line(left, y - 4, left + 26, y - 4, "line " + ClassOf(c));
     svg.Text(left + 33, y, curves[c].name, "label", Svg::Anchor::kStart);
   }
   for (size_t p = 0; p < charts.size(); ++p) {
@@ -105,8 +111,7 @@ std::string DrawCurves(const std::string& title, const std::vector<Chart>& chart
     DrawChart(charts[p], kWidth * static_cast<double>(p % kAbreast),
               legend + kHeight * static_cast<double>(row), svg);
   }
-  std::string text = svg.Print();
-  return text.insert(text.find("</title>") + 9, kStyle);
+  return svg.PrintAlone(kRules);
 }
 
 Band ConfidenceBand(const std::vector<double>& values, bool logarithmic) {

@@ -20,8 +20,9 @@ struct Chart {
   bool logarithmic_x = false;
 };
 
-/// Charts, two abreast, with one legend above, as SVG. At most eight curves. Colours are told apart
-/// by those who see fewer, too (Okabe, Ito, "Color Universal Design", 2008).
+/// Charts, two abreast, with one legend above, as SVG. The colours of the first ten curves are told
+/// apart by those who see fewer, too (eight of them are Okabe's and Ito's, "Color Universal
+/// Design", 2008, or grey); the next ten have them again, dashed, and all further ones likewise.
 std::string DrawCurves(const std::string& title, const std::vector<Chart>& charts);
 
 /// Standard deviations from the mean between which 95 % of a normal distribution are.

@@ -29,6 +29,13 @@ std::string Label(double value, double step) {
   return fmt::format("{:.{}f}", value, digits);
 }
 
+constexpr char kStyle[] =
+    R"(text { font: 12px system-ui, "Segoe UI", Helvetica, Arial, sans-serif; fill: #1b2330; }
+text.tick { font-size: 11px; fill: #5b6676; } text.name { font-weight: 600; }
+.paper { fill: #ffffff; } .frame { fill: none; stroke: #d8dee6; }
+.grid { fill: none; stroke: #e8ecf1; }
+)";
+
 }  // namespace
 
 std::string Escape(const std::string& text) {
@@ -196,6 +203,12 @@ std::string Svg::Print() const {
       "width=\"{0:.0f}\" "
       "height=\"{1:.0f}\" role=\"img\"><title>{2}</title>\n{3}</svg>\n",
       width_, height_, title_, body_);
+}
+
+std::string Svg::PrintAlone(const std::string& rules) const {
+  Svg alone = *this;
+  alone.body_ = fmt::format("<style>\n{}{}</style>\n{}", kStyle, rules, body_);
+  return alone.Print();
 }
 
 std::vector<Eigen::Vector2d> Ellipse(const Eigen::Vector2d& mean, const Eigen::Matrix2d& covariance,

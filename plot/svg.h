@@ -70,7 +70,10 @@ class Svg {
   void Frame(const Axis& x, const Axis& y, const std::string& x_label, const std::string& y_label,
              int x_ticks = 5, int y_ticks = 5);
 
+  /// For a page, whose style it takes.
   std::string Print() const;
+  /// For a file of its own, which brings its style: of text, paper, frame and grid, and by `rules`.
+  std::string PrintAlone(const std::string& rules) const;
 
  private:
   double width_, height_;

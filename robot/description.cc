@@ -122,39 +122,7 @@ std::string Neighbour(const fs::path& path) {
   return path.is_relative() ? ", seen from " + fs::current_path(error).string() : "";
 }
 
-}  // namespace
-
-RobotDescription LoadRobot(const std::string& folder_or_file) {
-  fs::path file = FileOf(folder_or_file);
-  std::error_code error;
-  const bool here = fs::exists(file, error);
-  if (!here) {
-    const fs::path installed = Installed(folder_or_file);
-    if (!fs::exists(installed, error))
-      throw ConfigError(file.string() + ": there is no such robot" + Neighbour(folder_or_file));
-    file = installed;
-  }
-  if (file.extension() == ".urdf")
-    throw ConfigError(file.string() + ": is a URDF: give the folder or the TOML file of its robot");
-  std::vector<std::string> files;
-  Config root = Config::Load(file.string(), &files);
-
-  RobotDescription robot;
-  robot.file = file.string();
-  Config header = root.Table("robot");
-  robot.name = header.String("name");
-  const std::string urdf_file = header.String("urdf");
-  const std::string urdf_path = (file.parent_path() / urdf_file).string();
-  if (!fs::exists(urdf_path, error))
-    header.Fail("urdf", fmt::format("= \"{}\": there is no such file", urdf_file));
-  const std::vector<std::string> fixed = header.Strings("fixed", std::vector<std::string>{});
-  header.Finish();
-  UrdfModel urdf = ReadUrdf(header, urdf_path, fixed);
-  files.push_back(urdf_path);
-  if (urdf.joints.empty()) root.Fail("robot", "has no moving joint in " + urdf_file);
-  robot.buses = ReadBuses(root);
-  robot.joints = ReadJoints(root, urdf, robot.buses);
-
+void RequireFd(Config& root, const RobotDescription& robot) {
   for (const JointDescription& joint : robot.joints) {
     const MotorDescription& motor = joint.motor;
     if (!joint.passive && NeedsFd(motor) && robot.buses[motor.bus].data_bit_rate == 0) {
@@ -163,6 +131,63 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
                             joint.name, motor.protocol));
     }
   }
+}
+
+// Here, else among those that are installed.
+fs::path FindRobot(const std::string& folder_or_file, bool* here) {
+  fs::path file = FileOf(folder_or_file);
+  std::error_code error;
+  *here = fs::exists(file, error);
+  if (!*here) {
+    const fs::path installed = Installed(folder_or_file);
+    if (!fs::exists(installed, error))
+      throw ConfigError(file.string() + ": there is no such robot" + Neighbour(folder_or_file));
+    file = installed;
+  }
+  if (file.extension() == ".urdf")
+    throw ConfigError(file.string() + ": is a URDF: give the folder or the TOML file of its robot");
+  return file;
+}
+
+// The URDF that [robot] names. @param files is added to.
+UrdfModel ReadModel(Config header, const fs::path& folder, std::vector<std::string>* files) {
+  const std::string file = header.String("urdf"), path = (folder / file).string();
+  std::error_code error;
+  if (!fs::exists(path, error))
+    header.Fail("urdf", fmt::format("= \"{}\": there is no such file", file));
+  const std::vector<std::string> fixed = header.Strings("fixed", std::vector<std::string>{});
+  header.Finish();
+  files->push_back(path);
+  return ReadUrdf(header, path, fixed);
+}
+
+std::vector<std::string> WarningsOf(const UrdfModel& urdf, const SimulationSettings& simulation) {
+  std::vector<std::string> warnings = urdf.warnings;
+  const auto add = [&](const std::vector<std::string>& more) {
+    warnings.insert(warnings.end(), more.begin(), more.end());
+  };
+  if (simulation.contact) add(urdf.contact_warnings);
+  if (simulation.contact && !simulation.link_pairs.empty()) add(urdf.pair_warnings);
+  return warnings;
+}
+
+}  // namespace
+
+RobotDescription LoadRobot(const std::string& folder_or_file) {
+  bool here;
+  const fs::path file = FindRobot(folder_or_file, &here);
+  std::vector<std::string> files;
+  Config root = Config::Load(file.string(), &files);
+
+  RobotDescription robot;
+  robot.file = file.string();
+  Config header = root.Table("robot");
+  robot.name = header.String("name");
+  UrdfModel urdf = ReadModel(std::move(header), file.parent_path(), &files);
+  if (urdf.joints.empty()) root.Fail("robot", "has no moving joint in " + files.back());
+  robot.buses = ReadBuses(root);
+  robot.joints = ReadJoints(root, urdf, robot.buses);
+  RequireFd(root, robot);
   robot.links = urdf.links;
   robot.sensors = ReadSensors(root, robot);
   RequireUse(root, robot);
@@ -177,19 +202,11 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
   robot.fingerprint = kEmptyHash;
   for (const std::string& part : files) robot.fingerprint = Hash(ReadFile(part), robot.fingerprint);
   robot.estimator = ReadEstimator(root.Table("estimator"), robot);
-  robot.warnings = std::move(urdf.warnings);
+  robot.warnings = WarningsOf(urdf, robot.simulation);
   // Whoever meant his own must see that it is another one.
   if (!here)
     robot.warnings.push_back(folder_or_file +
                              " is not here, the installed one is taken: " + file.string());
-  if (robot.simulation.contact) {
-    robot.warnings.insert(robot.warnings.end(), urdf.contact_warnings.begin(),
-                          urdf.contact_warnings.end());
-    if (!robot.simulation.link_pairs.empty()) {
-      robot.warnings.insert(robot.warnings.end(), urdf.pair_warnings.begin(),
-                            urdf.pair_warnings.end());
-    }
-  }
   FindContactPairs(robot);  // or it says what is wrong with one
   ReadParameters(root, robot.parameters, robot.frozen);
   robot.controller = ReadController(root.Table("controller"));

@@ -105,17 +105,17 @@ ParameterDistribution ReadMixture(const Field& mixture, const RobotDescription& 
 // Of what is lacking in the simulators that the mixture is of.
 void ReadGap(const Field& root, const RobotDescription& robot, ParameterDistribution* to) {
   if (root["version"].Number() == kPosteriorBeforeResiduals) return;
-  const auto velocities = static_cast<size_t>(robot.num_velocities()),
-             state = static_cast<size_t>(robot.num_positions()) + velocities;
+  const auto positions = static_cast<size_t>(robot.num_positions()),
+             velocities = static_cast<size_t>(robot.num_velocities());
   const Field residual = root["residual"], starts = root["starts"];
   if (!residual.null()) {
-    to->residual = ReadResidual(residual, robot.parameters.size(), state);
+    to->residual = ReadResidual(residual, robot.parameters.size(), 2 * velocities);
     for (const Eigen::VectorXd& draw : to->residual->coordinates)
       residual["draws"].Require(to->ToPhysical(draw).allFinite(), "is too wide: it overflows");
   }
   const ConfigurationSpace space(robot);
   for (const Field& start : starts.Entries(starts.size())) {
-    to->starts.push_back(start.SingleVector(state));
+    to->starts.push_back(start.SingleVector(positions + velocities));
     const std::string fault = space.Fault(to->starts.back().head(robot.num_positions()));
     start.Require(fault.empty(), "q " + fault);
   }

@@ -133,7 +133,8 @@ ResidualSample::ResidualSample(const Residual& residual) {
 
 void ResidualSample::Begin(size_t draw, Random& random) {
   draw_ = draw;
-  random_ = Random(uint64_t{random.Bits()} << 32 | random.Bits());
+  const uint64_t high = random.Bits();
+  random_ = Random(high << 32 | random.Bits());
   for (Part* part : {&free_, &touching_, &ground_, &stop_}) {
     for (double& normal : part->lasting) normal = random_.Normal();
   }

@@ -9,7 +9,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// More would be no residual but an attack on the memory.
 // Displacement and velocity in space.
 constexpr size_t kMostOfContact = 6;
 

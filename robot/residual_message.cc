@@ -14,7 +14,6 @@ using Message = residual_function_t;
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using RowMajorFloat = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-// More would be no residual but an attack on the memory.
 // In the order of Residual::kParts.
 constexpr int8_t kConditions[] = {Message::FREE, Message::TOUCHING, Message::GROUND, Message::STOP};
 static_assert(std::size(kConditions) == Residual::kParts.size());

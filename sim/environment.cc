@@ -1,6 +1,7 @@
 #include "sim/environment.h"
 
 #include <algorithm>
+#include <limits>
 #include <span>
 #include <stdexcept>
 #include <utility>
@@ -70,6 +71,7 @@ void Environment::SetState(const Eigen::Ref<const Eigen::VectorXd>& q,
   simulator_.SetState(q, v);
   effort_.setZero();
   sent_.setZero();
+  sent_for_ = parts_.back().duration;
   mean_effort_before_.setZero();
   Read();
 }
@@ -112,9 +114,10 @@ void Environment::Send(const Part& part) {
     const Eigen::VectorXd& wish = part.late ? next_effort_ : effort_;
     for (const Drive& drive : drives_) {
       double& sent = sent_[drive.velocity];
-      const JointSituation joint{q()[drive.position], v()[drive.velocity], sent, part.duration};
+      const JointSituation joint{q()[drive.position], v()[drive.velocity], sent, sent_for_};
       sent = LimitEffort(wish[drive.velocity], joint, drive.limits).value_or(0);
     }
+    sent_for_ = part.duration;
     simulator_.Prepare(sent_, part.duration);
     if (corrected_) mean_effort_ += part.duration / period_ * sent_;
     return;
@@ -136,8 +139,8 @@ StepResult Environment::End() {
     mean_effort_before_.swap(mean_effort_);
   }
   Read();
-  return {task_->Reward(start_q_, start_v_, effort_, q(), v()),
-          !simulator_.finite() || task_->Terminated(q(), v())};
+  if (!simulator_.finite()) return {std::numeric_limits<double>::quiet_NaN(), true};
+  return {task_->Reward(start_q_, start_v_, effort_, q(), v()), task_->Terminated(q(), v())};
 }
 
 void Environment::Read() {

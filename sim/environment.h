@@ -122,6 +122,7 @@ class Environment {
   Eigen::VectorXd next_effort_;
   std::array<EffortSegment, 2> profile_;  // of a step without a driver
   Eigen::VectorXd sent_;                  // of it, by the driver
+  double sent_for_ = 0;                   // [s]
   Eigen::VectorXd mean_effort_, mean_effort_before_;
   Eigen::VectorXd reading_q_, reading_v_;
 };

@@ -71,7 +71,7 @@ EpisodeSummary PlayEpisode(Environment& environment, const RobotDescription& rob
       episode.end = finite ? EpisodeSummary::End::kTerminated : EpisodeSummary::End::kNotFinite;
       return episode;
     }
-    if (stop()) {
+    if (episode.steps < limit && stop()) {
       episode.end = EpisodeSummary::End::kInterrupted;
       return episode;
     }

@@ -66,14 +66,9 @@ class Writer {
       text_ += "<geom type=\"plane\" size=\"0 0 1\" contype=\"0\" conaffinity=\"1\" " + surface_ +
                "/>\n";
     }
+    RequireBodies();
     for (const ContactPairs::Solid& at : touching_.solids) {
-      if (at.link == 0) {
-        WriteShape(0, at.shape);
-      } else if (Weightless(static_cast<size_t>(at.link) - 1)) {
-        throw std::invalid_argument("contact of link '" +
-                                    robot_.links[static_cast<size_t>(at.link)].name +
-                                    "', which has no mass, with other links");
-      }
+      if (at.link == 0) WriteShape(0, at.shape);
     }
     WriteChildren(0);
     text_ += "</worldbody>\n<actuator>\n";
@@ -85,6 +80,17 @@ class Writer {
 
  private:
   const JointDescription& joint(size_t index) const { return robot_.joints[index]; }
+
+  /// What has a shape that touches something has to be a body.
+  void RequireBodies() const {
+    if (!robot_.simulation.contact) return;
+    for (size_t i = 0; i < robot_.joints.size(); ++i) {
+      const LinkDescription& link = robot_.links[i + 1];
+      if (!Weightless(i) || link.collisions.empty()) continue;
+      throw std::invalid_argument(fmt::format(
+          "contact of link '{}', which has no mass, with the ground or other links", link.name));
+    }
+  }
 
   void WriteChildren(int link) {
     for (size_t i = 0; i < robot_.joints.size(); ++i) {

@@ -23,7 +23,7 @@ namespace plumb {
 /// and slip speed, is not in it. A link without mass that carries one joint is no body of its own:
 /// that joint is one more of the next link's.
 /// @param robot with known parameters (Model::Describe). Thread-safe.
-/// @throws std::invalid_argument if such a link is to touch others.
+/// @throws std::invalid_argument if such a link is to touch the ground or others.
 std::string Mjcf(const RobotDescription& robot);
 
 /// [s] of a contact's softness, the first number of solref: gym's over the square root of

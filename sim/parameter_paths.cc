@@ -70,11 +70,13 @@ std::vector<ParameterPath> FindPaths(const std::vector<ParameterPath>& paths,
   std::vector<std::string> names;
   for (const ParameterPath& candidate : paths) {
     if (candidate.path == name) return {candidate};
-    if (Covers(name, candidate.path) && !named.contains(candidate.path)) found.push_back(candidate);
     names.push_back(candidate.path);
+    if (candidate.effective() && Covers(name, candidate.path) && !named.contains(candidate.path))
+      found.push_back(candidate);
   }
   for (const ParameterPath& path : found) {
-    if (path.joint != found[0].joint || path.link != found[0].link) {
+    if (path.world != found[0].world || path.joint != found[0].joint ||
+        path.link != found[0].link) {
       throw std::invalid_argument(where + "'" + name + "' is '" + found[0].path + "' and '" +
                                   path.path + "': one number cannot be both");
     }

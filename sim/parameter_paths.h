@@ -20,6 +20,7 @@ struct ParameterPath {
   const WorldParameterKind* world = nullptr;
   const JointParameterKind* joint = nullptr;
   const LinkParameterKind* link = nullptr;
+  bool effective() const { return world || joint || link; }
 
   size_t index = 0;      ///< of the joint that moves the link, or of the joint's first velocity
   size_t count = 1;      ///< of the joint's velocities
@@ -32,8 +33,9 @@ std::vector<ParameterPath> ParameterPaths(const RobotDescription& description,
                                           const Physics<double>& physics);
 
 /// The one of that name, or all that it covers (robot/parameters.h) and that are not in `named`:
-/// those that another parameter names in full. @throws std::invalid_argument naming the nearest if
-/// there is none, if they are of several kinds, and, if it is known, the robot's file.
+/// those that another parameter names in full, and that have an effect.
+/// @throws std::invalid_argument naming the nearest if there is none, if they are of several kinds,
+/// and, if it is known, the robot's file.
 std::vector<ParameterPath> FindPaths(const std::vector<ParameterPath>& paths,
                                      const std::string& name, const std::set<std::string>& named,
                                      const std::string& file);

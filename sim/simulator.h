@@ -58,8 +58,8 @@ class Simulator {
   /// is still to come.
   void Recall(std::span<const EffortSegment> before);
 
-  /// Holds `effort` (num_velocities) for `duration` [s] >= 0, in equal substeps of at most
-  /// settings.substep:
+  /// Holds `effort` (num_velocities) for `duration` [s] >= 0, in equal substeps of about
+  /// settings.substep, at most a tenth longer (SubstepCount):
   ///   semi-implicit  v += h a(q, v), q += h v: of first order, as gym and MuJoCo's Euler do
   ///   leapfrog       q += h/2 v, v += h a(q, v), q += h/2 v: of second order but for stops,
   ///                  contacts and friction

@@ -9,6 +9,7 @@ namespace {
 
 // Of the mobility's trace: what keeps its inverse finite where a point cannot move each way.
 constexpr double kNugget = 1e-6;
+constexpr double kLeastMobility = 1e-9;  // [1/kg], of a stop [1/(kg m^2)]
 
 // At most 3 x 3: does not allocate.
 using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 3, 3>;
@@ -90,7 +91,7 @@ void StepContacts::End(Simulator& simulator, const Eigen::Ref<const Eigen::Vecto
     if (!(std::min(heights_[p], next_heights_[p]) <= margin_)) continue;
     Contact& contact = points_[static_cast<size_t>(p)];
     contact.jacobian = jacobians_.middleRows(p * k, k);
-    Respond(simulator, &contact);
+    if (!Respond(simulator, &contact)) continue;
     contact.x[0] = heights_[p];
     contact.x.segment(1, k) = velocities_.col(p);
     contact.x[1 + k] = next_heights_[p];
@@ -107,26 +108,29 @@ void StepContacts::End(Simulator& simulator, const Eigen::Ref<const Eigen::Vecto
     if (!(std::min(away * (q_[position] - stop), away * (q - stop)) <= margin_)) continue;
     Contact& contact = joints_[s];
     contact.jacobian(0, velocity) = away;
-    Respond(simulator, &contact);
+    if (!Respond(simulator, &contact)) continue;
     contact.x << away * (q_[position] - stop), away * v_[velocity], away * (q - stop),
         away * simulator.v()[velocity], away * constrained[velocity];
     touching_.push_back(&contact);
   }
 }
 
-// Mobility and response of its Jacobian.
-void StepContacts::Respond(Simulator& simulator, Contact* contact) {
+// Mobility and response of its Jacobian. @return false if nothing moves the point: no contact can
+// act on the robot there.
+bool StepContacts::Respond(Simulator& simulator, Contact* contact) {
   Eigen::MatrixXd& response = contact->response;  // M^-1 J' at first
   for (Eigen::Index i = 0; i < contact->jacobian.rows(); ++i) {
     impulse_ = contact->jacobian.row(i).transpose();
     simulator.ImpulseResponse(impulse_, response.col(i));
   }
   contact->mobility = contact->jacobian.lazyProduct(response);
+  if (!(contact->mobility.trace() > kLeastMobility)) return false;
   Small loaded = contact->mobility;
   loaded.diagonal().array() += kNugget * loaded.trace();
   const Eigen::LLT<Small> factor(loaded);
   factor.matrixU().solveInPlace<Eigen::OnTheRight>(response);
   factor.matrixL().solveInPlace<Eigen::OnTheRight>(response);
+  return true;
 }
 
 void StepContacts::Nearness(Eigen::Ref<Eigen::VectorXd> nearness) const {

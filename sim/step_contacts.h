@@ -61,7 +61,7 @@ class StepContacts {
     double lower, upper;
   };
   void Look(Simulator& simulator, Eigen::VectorXd* heights, Eigen::MatrixXd* velocities);
-  void Respond(Simulator& simulator, Contact* contact);
+  bool Respond(Simulator& simulator, Contact* contact);
 
   double margin_;
   Eigen::Index directions_;

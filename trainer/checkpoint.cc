@@ -21,8 +21,8 @@ namespace {
 
 // Numbers as this machine has them: a checkpoint stays where it was written. Version 3: without
 // trials on the robot, 4 to 6: with other residuals, 7: without the updates' statuses, 8: without
-// what a decision owes to simulation.
-constexpr FileKind kKind{"PLUMBTRN", 9, "a trainer's checkpoint"};
+// what a decision owes to simulation, 9: without what the best policy's normaliser has seen.
+constexpr FileKind kKind{"PLUMBTRN", 10, "a trainer's checkpoint"};
 
 class CheckpointWriter {
  public:
@@ -116,6 +116,14 @@ void Transfer(Archive& archive, C& critic) {
 }
 
 template <class Archive, class C>
+requires std::same_as<std::remove_const_t<C>, ObservationMoments>
+void Transfer(Archive& archive, C& observations) {
+  archive(observations.count);
+  archive(observations.mean);
+  archive(observations.squares);
+}
+
+template <class Archive, class C>
 requires std::same_as<std::remove_const_t<C>, TriedPolicy>
 void Transfer(Archive& archive, C& tried) {
   archive(tried.iteration);
@@ -160,9 +168,7 @@ void Transfer(Archive& archive, C& checkpoint) {
   archive.EncodedMessage(checkpoint.policy);
   archive.EncodedMessage(checkpoint.distribution);
   Transfer(archive, checkpoint.critic);
-  archive(checkpoint.observations.count);
-  archive(checkpoint.observations.mean);
-  archive(checkpoint.observations.squares);
+  Transfer(archive, checkpoint.observations);
   archive.Size(checkpoint.trials);
   for (auto& tried : checkpoint.trials) Transfer(archive, tried);
   Transfer(archive, checkpoint.decision);
@@ -175,6 +181,7 @@ void Transfer(Archive& archive, C& checkpoint) {
   if (!checkpoint.judged) return;
   archive.EncodedMessage(checkpoint.best_policy);
   Transfer(archive, checkpoint.best_critic);
+  Transfer(archive, checkpoint.best_observations);
   archive(checkpoint.best_updates);
   archive(checkpoint.best_return);
 }
@@ -206,7 +213,7 @@ TrainerState TrainerStateOf(const Checkpoint& checkpoint) {
   if (checkpoint.judged) {
     state.best =
         JudgedPolicy{GaussianPolicy::FromMessage(checkpoint.best_policy), checkpoint.best_critic,
-                     checkpoint.best_updates, checkpoint.best_return};
+                     checkpoint.best_updates, checkpoint.best_return, checkpoint.best_observations};
   }
   return state;
 }
@@ -220,6 +227,7 @@ void SetTrainerState(const TrainerState& state, Checkpoint& checkpoint) {
   if (!state.best) return;
   checkpoint.best_policy = state.best->policy.ToMessage();
   checkpoint.best_critic = state.best->critic;
+  checkpoint.best_observations = state.best->observations;
   checkpoint.best_updates = state.best->updates;
   checkpoint.best_return = state.best->mean_return;
 }

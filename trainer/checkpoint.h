@@ -50,6 +50,7 @@ struct Checkpoint {
   bool judged = false;
   policy_t best_policy{};
   CriticState best_critic;
+  ObservationMoments best_observations;
   int64_t best_updates = 0;
   double best_return = 0;
   /// See TrainingSession: the trials, the last choice (challenger -1: none), the iteration in which

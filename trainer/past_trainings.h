@@ -32,7 +32,10 @@ class PastTrainings {
   /// @return its status. @throws CheckpointError if it is of another robot after all.
   std::optional<training_status_t> Repeat(TrainingSession& session);
   /// The iteration goes on with another distribution: it cannot be repeated.
-  void Forget() { beginning_ = 0; }
+  void Forget() {
+    beginning_ = 0;
+    past_.reset();
+  }
   /// An update that was not made before has been made.
   void Add(const training_status_t& status) { statuses_.push_back(status); }
   /// The session's checkpoint, with which it can be repeated.

@@ -34,7 +34,10 @@ class RobotSimulation : public Simulation {
     environment_.Reset(random);
     if (const Eigen::VectorXd& start = simulator.start; start.size() > 0)
       environment_.SetState(start.head(q_.size()), start.tail(v_.size()));
-    if (noisy()) noise_ = Random(uint64_t{random.Bits()} << 32 | random.Bits());
+    if (noisy()) {
+      const uint64_t high = random.Bits();
+      noise_ = Random(high << 32 | random.Bits());
+    }
     Read();
   }
   void Observe(Eigen::Ref<Eigen::VectorXf> observation) const override {

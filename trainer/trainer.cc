@@ -74,11 +74,12 @@ void Trainer::Restore(TrainerState state) {
   if (state.policy.shape() != policy_.shape() ||
       (state.best && state.best->policy.shape() != policy_.shape()))
     throw std::invalid_argument("trainer: state of another network");
-  const Eigen::Index seen = state.observations.mean.size();
-  if (state.observations.squares.size() != seen ||
-      (seen != 0 && seen != policy_.shape().observations)) {
+  const auto fits = [&](const ObservationMoments& seen) {
+    return seen.squares.size() == seen.mean.size() &&
+           (seen.mean.size() == 0 || seen.mean.size() == policy_.shape().observations);
+  };
+  if (!fits(state.observations) || (state.best && !fits(state.best->observations)))
     throw std::invalid_argument("trainer: state of other observations");
-  }
   if (state.best) critic_.Restore(state.best->critic);  // throws now, if at all
   critic_.Restore(std::move(state.critic));
   policy_ = std::move(state.policy);
@@ -186,7 +187,7 @@ void Trainer::Judge(const ParameterSampler& sample) {
       MeanOfWorst(rollout_.Returns(policy_, sample, kJudgementEpisodes, seed_, kJudgementStream, 0),
                   settings_.worst_share);
   if (best_ && !std::isnan(best_->mean_return) && !(mean > best_->mean_return)) return;
-  best_ = JudgedPolicy{policy_, critic_.state(), updates_, mean};
+  best_ = JudgedPolicy{policy_, critic_.state(), updates_, mean, observations_};
 }
 
 int64_t Trainer::ReturnToBest(const ParameterSampler& sample) {
@@ -194,6 +195,7 @@ int64_t Trainer::ReturnToBest(const ParameterSampler& sample) {
   const JudgedPolicy best = *std::exchange(best_, {});
   policy_ = best.policy;
   critic_.Restore(best.critic);
+  observations_ = best.observations;
   return best.updates;
 }
 

@@ -20,12 +20,13 @@ namespace plumb {
 /// Thread-safe.
 TrainingSettings PaperSettings(TrainingSettings settings);
 
-/// A policy that was judged, and the critic that goes with it.
+/// A policy that was judged, the critic that goes with it, and what its normaliser follows.
 struct JudgedPolicy {
   GaussianPolicy policy;
   CriticState critic;
   int64_t updates = 0;     ///< after which it stood
   double mean_return = 0;  ///< without exploration; NaN if no episode could be used
+  ObservationMoments observations{};
 };
 
 /// All that training has learnt, as a checkpoint keeps it.
@@ -91,7 +92,8 @@ class Trainer {
   /// of them from which it learns.
   void Judge(const ParameterSampler& sample);
   /// TRPO's last policy is not its best. Judges it, too, and goes back to the best one with its
-  /// critic; what follows is judged anew. @return after how many updates it stood.
+  /// critic and all that its normaliser has seen: with more, the next update would move it by more
+  /// than any KL bound. What follows is judged anew. @return after how many updates it stood.
   int64_t ReturnToBest(const ParameterSampler& sample);
   /// Other simulators than those of the judgements so far: they are void.
   void ForgetBest() { best_.reset(); }

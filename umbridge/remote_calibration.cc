@@ -179,9 +179,7 @@ Eigen::Index NextStatesSize(const RobotDescription& robot, std::span<const Log> 
 Findings CalibrateRemote(const RobotDescription& robot, std::span<const Log> logs,
                          RemoteModel& model, const CalibrationOptions& options) {
   const auto start = std::chrono::steady_clock::now();
-  std::vector<Rollout> rollouts;
-  for (const Log& log : logs)
-    rollouts.insert(rollouts.end(), log.rollouts.begin(), log.rollouts.end());
+  const std::vector<Rollout> rollouts = RolloutsOf(logs);
   const Prior prior = PriorOf(robot);
   RemoteErrors errors(robot, rollouts, model, options.progress);
   const LaplaceFit fit = Fit(errors, prior, model);

@@ -25,10 +25,10 @@ constexpr size_t kBesideNumbers = 64 << 10, kLongestNumber = 32;  // [bytes] of 
   throw std::runtime_error(server + ": " + what);
 }
 
-/// @return an object.
+/// @return an object, with a field "error" if the status is not one of success.
 json Ask(const std::string& server, const std::string& path, const json& request,
-         size_t longest = kBesideNumbers) {
-  const HttpAnswer answer = PostHttp(server, path, request.dump(), longest);
+         const std::function<void()>& look, size_t longest = kBesideNumbers) {
+  const HttpAnswer answer = PostHttp(server, path, request.dump(), longest, look);
   json said;
   try {
     said = ParseJson(answer.body);
@@ -36,6 +36,8 @@ json Ask(const std::string& server, const std::string& path, const json& request
     Fail(server, fmt::format("{} is answered with status {} and no JSON", path, answer.status));
   }
   if (!said.is_object()) Fail(server, path + " is answered with no JSON object");
+  if (answer.status / 100 != 2 && !said.contains("error"))
+    Fail(server, fmt::format("{} is answered with status {}", path, answer.status));
   return said;
 }
 
@@ -54,8 +56,8 @@ std::string ErrorIn(const json& answer) {
 }
 
 void RequireSize(const std::string& server, const std::string& name, const std::string& path,
-                 const char* field, Eigen::Index size) {
-  const json answer = Ask(server, path, {{"name", name}, {"config", json::object()}});
+                 const char* field, Eigen::Index size, const std::function<void()>& look) {
+  const json answer = Ask(server, path, {{"name", name}, {"config", json::object()}}, look);
   if (const std::string error = ErrorIn(answer); !error.empty()) Fail(server, error);
   const json expected = json::array({size});
   if (!answer.contains(field) || answer[field] != expected) {
@@ -67,10 +69,13 @@ void RequireSize(const std::string& server, const std::string& name, const std::
 }  // namespace
 
 RemoteModel::RemoteModel(std::string server, std::string name, Eigen::Index inputs,
-                         Eigen::Index outputs)
-    : server_(std::move(server)), name_(std::move(name)), outputs_(outputs) {
-  RequireSize(server_, name_, "/InputSizes", "inputSizes", inputs);
-  RequireSize(server_, name_, "/OutputSizes", "outputSizes", outputs);
+                         Eigen::Index outputs, std::function<void()> look)
+    : server_(std::move(server)),
+      name_(std::move(name)),
+      outputs_(outputs),
+      look_(std::move(look)) {
+  RequireSize(server_, name_, "/InputSizes", "inputSizes", inputs, look_);
+  RequireSize(server_, name_, "/OutputSizes", "outputSizes", outputs, look_);
 }
 
 Eigen::MatrixXd RemoteModel::Evaluate(const Eigen::MatrixXd& inputs) {
@@ -79,7 +84,7 @@ Eigen::MatrixXd RemoteModel::Evaluate(const Eigen::MatrixXd& inputs) {
     const std::vector<double> input(inputs.col(j).begin(), inputs.col(j).end());
     const json answer =
         Ask(server_, "/Evaluate",
-            {{"name", name_}, {"input", json::array({input})}, {"config", json::object()}},
+            {{"name", name_}, {"input", json::array({input})}, {"config", json::object()}}, look_,
             kBesideNumbers + kLongestNumber * static_cast<size_t>(outputs_));
     if (const std::string error = ErrorIn(answer); !error.empty()) {
       last_error_ = error;

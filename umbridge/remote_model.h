@@ -1,7 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstddef>
+#include <functional>
 #include <string>
 
 namespace plumb {
@@ -10,10 +10,12 @@ namespace plumb {
 /// vector in, one vector out. Not thread-safe.
 class RemoteModel {
  public:
-  /// Asks whether the server has it, in these sizes. @param server see PostHttp.
+  /// Asks whether the server has it, in these sizes. @param server, look see PostHttp.
   /// @throws std::invalid_argument for an address that is none; std::runtime_error naming the
   /// server if it cannot be reached, does not speak the protocol, or has no such model.
-  RemoteModel(std::string server, std::string name, Eigen::Index inputs, Eigen::Index outputs);
+  RemoteModel(
+      std::string server, std::string name, Eigen::Index inputs, Eigen::Index outputs,
+      std::function<void()> look = [] {});
 
   const std::string& name() const { return name_; }
   /// inputs x N -> outputs x N, a request for each column. Where the server answers with an error,
@@ -26,6 +28,7 @@ class RemoteModel {
  private:
   std::string server_, name_;
   Eigen::Index outputs_;
+  std::function<void()> look_;
   std::string last_error_;
 };
 

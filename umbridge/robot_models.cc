@@ -16,13 +16,6 @@
 namespace plumb {
 namespace {
 
-std::vector<Rollout> All(std::span<const Log> logs) {
-  std::vector<Rollout> rollouts;
-  for (const Log& log : logs)
-    rollouts.insert(rollouts.end(), log.rollouts.begin(), log.rollouts.end());
-  return rollouts;
-}
-
 CurriculumFit FirstFit(const std::shared_ptr<const Model>& model, std::span<const Rollout> rollouts,
                        ExecutionOptions execution) {
   CurriculumOptions options;
@@ -36,7 +29,7 @@ CurriculumFit FirstFit(const std::shared_ptr<const Model>& model, std::span<cons
 struct RobotModels::Parts {
   Parts(const RobotDescription& robot, std::span<const Log> logs, ExecutionOptions execution)
       : model(std::make_shared<Model>(robot)),
-        rollouts(All(logs)),
+        rollouts(RolloutsOf(logs)),
         first(FirstFit(model, rollouts, execution)),
         errors(model, rollouts, 1, execution),
         steps(model, rollouts, execution.threads),

@@ -77,7 +77,7 @@ UmbridgeServer::UmbridgeServer(const ListenAddress& listen, std::vector<std::str
 
 UmbridgeServer::~UmbridgeServer() = default;
 
-uint16_t UmbridgeServer::port() const { return parts_->server.port(); }
+std::string UmbridgeServer::url() const { return parts_->server.url(); }
 
 void UmbridgeServer::Run(int stop_fd, const std::function<bool()>& stopping) {
   parts_->stop.assign(stop_fd);

@@ -23,7 +23,7 @@ class UmbridgeServer {
                  std::vector<ServedModel> models);
   ~UmbridgeServer();
 
-  uint16_t port() const;
+  std::string url() const;  ///< "http://127.0.0.1:4242"
   /// Serves until `stop_fd` is readable and `stopping` says so; what is being evaluated then is
   /// waited for.
   void Run(int stop_fd, const std::function<bool()>& stopping);

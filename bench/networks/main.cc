@@ -26,6 +26,7 @@
 #include <vector>
 
 #include "bench/networks/eigen_network.h"
+#include "common/median.h"
 #include "common/random.h"
 #include "trainer/kernels/network.h"
 #ifdef PLUMB_ONEDNN
@@ -132,12 +133,6 @@ Candidate Make(const std::string& name, const Problem& p) {
             }
             return all;
           }};
-}
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// Processor time [us] per call.

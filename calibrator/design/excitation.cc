@@ -34,18 +34,19 @@ struct Motion {
   Eigen::MatrixXd q;
 };
 
-// The share of its limits that a state leaves unused, the least of all joints.
+// The share of its limits that a state leaves unused, the least of all joints. Spherical joints
+// have none.
 double Margin(const RobotDescription& robot, const Eigen::VectorXd& q, const Eigen::VectorXd& v) {
   double margin = 1;
-  Eigen::Index i = 0;
+  Eigen::Index position = 0, velocity = 0;
   for (const JointDescription& joint : robot.joints) {
     if (std::isfinite(joint.velocity_limit))
-      margin = std::min(margin, 1 - std::abs(v(i)) / joint.velocity_limit);
+      margin = std::min(margin, 1 - std::abs(v(velocity)) / joint.velocity_limit);
     if (!robot.simulation.stop && std::isfinite(joint.lower) && std::isfinite(joint.upper)) {
-      const double range = joint.upper - joint.lower;
-      margin = std::min({margin, (q(i) - joint.lower) / range, (joint.upper - q(i)) / range});
+      const double range = joint.upper - joint.lower, at = q(position);
+      margin = std::min({margin, (at - joint.lower) / range, (joint.upper - at) / range});
     }
-    ++i;
+    position += joint.num_positions(), velocity += joint.num_velocities();
   }
   return std::isfinite(margin) ? margin : -std::numeric_limits<double>::infinity();
 }

@@ -43,8 +43,7 @@ struct RatedExcitation {
 /// then they are part of the motion.
 /// @param belief over the parameters' coordinates: the prior, or a posterior.
 /// @return best first, maybe none.
-/// @throws std::invalid_argument if the robot has no parameters or motors, or its description has
-/// spherical joints.
+/// @throws std::invalid_argument if the robot has no parameters or motors.
 std::vector<RatedExcitation> RateExcitations(const RobotDescription& robot, const Gaussian& belief,
                                              const ExcitationSettings& settings);
 

@@ -14,7 +14,8 @@
 namespace plumb {
 namespace {
 
-constexpr int kMaxCandidates = 3;       // that are told of, one after the other
+constexpr size_t kMaxCauses = 3;        // one after the other
+constexpr size_t kMaxTold = 3;          // tests, and places
 constexpr double kNearlyAsGood = 0.85;  // of the best one's gain: an alternative
 constexpr size_t kMaxAlternatives = 2;
 constexpr double kWorthwhile = 0.3;  // share of what is left that a further one has to explain
@@ -151,6 +152,79 @@ Explained Explain(const ProjectedErrors& errors, const std::vector<bool>& noise_
   return {share, fmt::format("{:.0f} % of {}", 100 * share, of_it ? "it" : "the errors' variance")};
 }
 
+// A candidate that the errors speak for, and what is said of it.
+struct Cause {
+  Misfit misfit;
+  std::string line;
+};
+
+// " (nearly as well: a; b)" where others would do.
+std::string Alternatives(const std::vector<Explanation>& explanations, const Explanation& best) {
+  std::vector<std::string> alternatives;
+  for (const Explanation& other : explanations) {
+    if (&other == &best || other.score.gain < kNearlyAsGood * best.score.gain) continue;
+    if (alternatives.size() < kMaxAlternatives) alternatives.push_back(other.misfit.what);
+  }
+  if (alternatives.empty()) return "";
+  return fmt::format(" (nearly as well: {})", fmt::join(alternatives, "; "));
+}
+
+// One cause after the other, each of what those before it leave of the errors.
+std::vector<Cause> FindCauses(const FitResiduals& residuals, size_t tests,
+                              std::vector<Explanation> explanations, ProjectedErrors* errors) {
+  std::vector<Cause> causes;
+  while (causes.size() < kMaxCauses) {
+    for (Explanation& explanation : explanations)
+      explanation.misfit.p = std::min(1.0, explanation.misfit.p * static_cast<double>(tests));
+    const auto best =
+        std::find_if(explanations.begin(), explanations.end(),
+                     [](const Explanation& explanation) { return Counts(explanation.misfit); });
+    if (best == explanations.end()) break;
+    const Explained explained = Explain(*errors, residuals.noise_known, best->score.gain);
+    // No model is linear: a little of what the first candidate is about is always left.
+    if (!causes.empty() && explained.share < kWorthwhile) break;
+    Locate(*errors, *best, &best->misfit);
+    causes.push_back(
+        {best->misfit,
+         fmt::format("{}{} would explain {}{}", causes.empty() ? "" : "of what is left ",
+                     best->misfit.what, explained.summary, Alternatives(explanations, *best))});
+    errors->Explain(best->column);
+    explanations = FindExplanations(*errors, residuals);
+  }
+  return causes;
+}
+
+// The tests that are worth a word, the most telling first.
+std::vector<Misfit> Notable(std::vector<Misfit> tests) {
+  std::erase_if(tests, [](const Misfit& test) {
+    return !Counts(test) && !(test.test == "outliers" && Significant(test));
+  });
+  std::stable_sort(tests.begin(), tests.end(), [](const Misfit& a, const Misfit& b) {
+    return std::pair(Counts(a), a.effect) > std::pair(Counts(b), b.effect);
+  });
+  return tests;
+}
+
+// What the first tests say: "a; b; c".
+std::string Told(const std::vector<Misfit>& tests) {
+  std::vector<std::string> told;
+  for (const Misfit& test : tests) {
+    if (told.size() < kMaxTold) told.push_back(test.what);
+  }
+  return fmt::format("{}", fmt::join(told, "; "));
+}
+
+// The first places where something is wrong, each once: "a; b; c".
+std::string Places(const ProjectedErrors& errors, const std::vector<Misfit>& misfits) {
+  std::vector<std::string> places;
+  for (const Misfit& misfit : misfits) {
+    const std::string place = errors.Place(misfit.joint, misfit.condition);
+    const bool known = std::find(places.begin(), places.end(), place) != places.end();
+    if (!known && places.size() < kMaxTold) places.push_back(place);
+  }
+  return fmt::format("{}", fmt::join(places, "; "));
+}
+
 }  // namespace
 
 Misspecification FindMisspecification(const RobotDescription& robot,
@@ -170,69 +244,26 @@ Misspecification FindMisspecification(const RobotDescription& robot,
   Correct(count, &tests);
   found.alarm = std::any_of(tests.begin(), tests.end(), Counts);
 
-  std::vector<std::string> words, places;
-  for (int round = 0; round < kMaxCandidates; ++round) {
-    for (Explanation& explanation : explanations) {
-      explanation.misfit.p = std::min(1.0, explanation.misfit.p * static_cast<double>(count));
-    }
-    const auto best =
-        std::find_if(explanations.begin(), explanations.end(),
-                     [](const Explanation& explanation) { return Counts(explanation.misfit); });
-    if (best == explanations.end()) break;
-    const Explained explained = Explain(errors, residuals.noise_known, best->score.gain);
-    // No model is linear: a little of what the first candidate is about is always left.
-    if (round > 0 && explained.share < kWorthwhile) break;
+  const std::vector<Cause> causes = FindCauses(residuals, count, std::move(explanations), &errors);
+  if (!causes.empty()) {
     found.alarm = true;
-    Locate(errors, *best, &best->misfit);
-    places.push_back(errors.Place(best->misfit.joint, best->misfit.condition));
-    std::string line = fmt::format("{} would explain {}", best->misfit.what, explained.summary);
-    std::vector<std::string> alternatives;
-    for (const Explanation& other : explanations) {
-      if (&other == &*best || other.score.gain < kNearlyAsGood * best->score.gain) continue;
-      if (alternatives.size() < kMaxAlternatives) alternatives.push_back(other.misfit.what);
-    }
-    if (!alternatives.empty())
-      line += " (nearly as well: " + fmt::format("{}", fmt::join(alternatives, "; ")) + ")";
-    words.push_back((round == 0 ? "" : "of what is left ") + line);
-    found.misfits.push_back(best->misfit);
-    errors.Explain(best->column);
-    explanations = FindExplanations(errors, residuals);
-  }
-
-  if (!found.misfits.empty()) {
     tests = TestErrors(errors, residuals.noise_known);
     Correct(count, &tests);
   }
-  std::erase_if(tests, [](const Misfit& test) {
-    return !Counts(test) && !(test.test == "outliers" && Significant(test));
-  });
-  std::stable_sort(tests.begin(), tests.end(), [](const Misfit& a, const Misfit& b) {
-    return std::pair(Counts(a), a.effect) > std::pair(Counts(b), b.effect);
-  });
-  std::vector<std::string> rest;
-  for (const Misfit& test : tests) {
-    if (rest.size() < 3) rest.push_back(test.what);
-    if (found.alarm) places.push_back(errors.Place(test.joint, test.condition));
-  }
+  tests = Notable(std::move(tests));
+  for (const Cause& cause : causes) found.misfits.push_back(cause.misfit);
   found.misfits.insert(found.misfits.end(), tests.begin(), tests.end());
 
-  std::vector<std::string> distinct;
-  for (const std::string& place : places) {
-    if (std::find(distinct.begin(), distinct.end(), place) == distinct.end() && distinct.size() < 3)
-      distinct.push_back(place);
-  }
   if (!found.alarm) {
     found.summary = fmt::format("nothing speaks against the model ({} tests of {} errors)", count,
                                 errors.r.size());
-    if (!rest.empty()) found.summary += ", but look at " + fmt::format("{}", fmt::join(rest, "; "));
+    if (!tests.empty()) found.summary += ", but look at " + Told(tests);
     return found;
   }
-  found.summary =
-      "the model cannot explain this log: " + fmt::format("{}", fmt::join(distinct, "; "));
-  for (const std::string& line : words) found.summary += "; " + line;
-  if (!rest.empty())
-    found.summary += (words.empty() ? "; " : "; not explained by that: ") +
-                     fmt::format("{}", fmt::join(rest, "; "));
+  found.summary = "the model cannot explain this log: " + Places(errors, found.misfits);
+  for (const Cause& cause : causes) found.summary += "; " + cause.line;
+  if (!tests.empty())
+    found.summary += (causes.empty() ? "; " : "; not explained by that: ") + Told(tests);
   return found;
 }
 

@@ -28,7 +28,8 @@ class Test {
   Test(const TestedFit& fit, ExecutionOptions execution)
       : fit_(fit),
         robot_(fit.model->description()),
-        physical_(robot_.ToPhysical(fit.posterior.mean)),
+        mean_(Moments(fit.posterior).mean),
+        physical_(robot_.ToPhysical(mean_)),
         candidates_(FindCandidates(robot_)),
         extended_(std::make_shared<Model>(WithCandidates(robot_, candidates_))),
         errors_(extended_, fit.rollouts, ShortestWindow(fit.rollouts), execution),
@@ -45,7 +46,7 @@ class Test {
     if (!all.alarm || errors_.starts_known()) return {all, Consider(residuals, all)};
     Misspecification found = AskWitnesses();
     // Where nobody can tell, what all errors say may be so.
-    Gaussian considered = Consider(residuals, found.judged ? found : all);
+    GaussianMixture considered = Consider(residuals, found.judged ? found : all);
     return {std::move(found), std::move(considered)};
   }
 
@@ -66,7 +67,7 @@ class Test {
   }
 
   // With what the parameters would change by, if each of the candidates changed.
-  Gaussian Consider(const FitResiduals& residuals, const Misspecification& found) const {
+  GaussianMixture Consider(const FitResiduals& residuals, const Misspecification& found) const {
     double best = 0;
     for (const CandidateChange& change : found.changes) best = std::max(best, change.gain);
     if (best == 0) return fit_.posterior;
@@ -84,7 +85,10 @@ class Test {
                              residuals.columns.col(static_cast<Eigen::Index>(change.candidate))) *
                             change.change * std::sqrt(change.gain / best);
     }
-    return Displaced(prior, fit_.posterior, moved);
+    GaussianMixture considered = fit_.posterior;
+    for (Gaussian& component : considered.components)
+      component = Displaced(prior, component, moved);
+    return considered;
   }
 
   // Errors of windows depend on their own readings, and where motion is not linear over the noise
@@ -181,7 +185,7 @@ class Test {
     const Prior prior = PriorOf(robot_);
     Eigen::MatrixXd at = nominal_.replicate(1, prior.size() + 1);
     for (Eigen::Index i = 0; i < prior.size(); ++i) {
-      Eigen::VectorXd moved = fit_.posterior.mean;
+      Eigen::VectorXd moved = mean_;
       moved(i) += kSlopeDifference * prior.marginals()[static_cast<size_t>(i)].b;
       at.col(i).head(physical_.size()) = robot_.ToPhysical(moved);
     }
@@ -191,7 +195,7 @@ class Test {
 
   const TestedFit& fit_;
   const RobotDescription& robot_;
-  Eigen::VectorXd physical_, nominal_;
+  Eigen::VectorXd mean_, physical_, nominal_;  // of the posterior's mean
   std::vector<Candidate> candidates_;
   std::shared_ptr<const Model> extended_;
   WindowErrors errors_;
@@ -243,7 +247,7 @@ OneStepView ViewOneStep(const MethodInput& input, const MethodResult& result) {
 
 ModelTest TestModel(const MethodInput& input, const MethodResult& result, const OneStepView& view,
                     int64_t* simulated_steps) {
-  return TestModel({input.model, input.rollouts, Moments(result.posterior), view.fit, view.rows,
+  return TestModel({input.model, input.rollouts, result.posterior, view.fit, view.rows,
                     view.noise_sd, view.noise_known},
                    input.options.execution, simulated_steps);
 }

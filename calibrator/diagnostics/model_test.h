@@ -20,7 +20,7 @@ namespace plumb {
 struct TestedFit {
   std::shared_ptr<const Model> model;
   std::span<const Rollout> rollouts;
-  Gaussian posterior;                       ///< coordinates
+  const GaussianMixture& posterior;         ///< coordinates
   const LaplaceFit& one_step;               ///< errors and slopes at the mean
   std::span<const WindowErrors::Row> rows;  ///< what its errors are about
   /// of each entry of (q, v), as estimated or as recorded, physical units
@@ -32,11 +32,11 @@ struct TestedFit {
 struct ModelTest {
   Misspecification found;
   /// The posterior as wide as what may be wrong makes it, coordinates. Each candidate that would
-  /// explain errors takes the parameters elsewhere if it changes: the data's estimate is Displaced
-  /// by that, times the root of the share of the best one's gain that its own is. Which of the
-  /// candidates it is, if it is one, is not known. Where nobody can tell whether the model is
-  /// right, candidates are those that would explain all errors.
-  Gaussian considered;
+  /// explain errors takes the parameters elsewhere if it changes: the data's estimate, in each
+  /// component, is Displaced by that, times the root of the share of the best one's gain that its
+  /// own is. Which of the candidates it is, if it is one, is not known. Where nobody can tell
+  /// whether the model is right, candidates are those that would explain all errors.
+  GaussianMixture considered;
 };
 
 /// Whether the model can explain the log at all, whatever its parameters: FindMisspecification of

@@ -1,10 +1,13 @@
 #include "calibrator/fit/methods.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <stdexcept>
 
 #include "calibrator/fit/abc_methods.h"
 #include "calibrator/fit/likelihood_methods.h"
+#include "calibrator/fit/robot_problem.h"
 #include "calibrator/fit/search_methods.h"
 #include "common/config.h"
 #include "common/nearest_name.h"
@@ -37,8 +40,15 @@ void RequireMethod(const std::string& wanted) {
                               NearestName(wanted, names) + "'?");
 }
 
+void RequireDiscrepancy(const std::string& wanted) {
+  const auto& names = RobotDiscrepancies();
+  if (std::find(names.begin(), names.end(), wanted) != names.end()) return;
+  throw std::invalid_argument(
+      fmt::format("there is no discrepancy '{}'; there are {}", wanted, fmt::join(names, ", ")));
+}
+
 MethodResult RunMethod(const MethodInput& input) {
-  RequireMethod(input.options.method);
+  RequireMethod(input.options.method), RequireDiscrepancy(input.options.discrepancy);
   return std::find_if(Methods().begin(), Methods().end(),
                       [&](const Method& method) { return method.name == input.options.method; })
       ->run(input);

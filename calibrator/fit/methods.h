@@ -17,8 +17,11 @@ const std::vector<std::string>& CalibrationMethods();
 /// @throws std::invalid_argument naming the nearest method if there is none of that name.
 void RequireMethod(const std::string& name);
 
+/// @throws std::invalid_argument naming RobotDiscrepancies() if it is none of them.
+void RequireDiscrepancy(const std::string& name);
+
 /// Runs the method that input.options names. @throws std::invalid_argument if there is none of that
-/// name, or the data cannot be used.
+/// name, the discrepancy is none, whether the method needs it or not, or the data cannot be used.
 MethodResult RunMethod(const MethodInput& input);
 
 }  // namespace plumb

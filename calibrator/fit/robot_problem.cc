@@ -1,12 +1,8 @@
 #include "calibrator/fit/robot_problem.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <stdexcept>
 
 #include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/inference/distances.h"
@@ -48,11 +44,6 @@ const std::vector<std::string>& RobotDiscrepancies() {
 
 Problem RobotProblem(const RobotDescription& robot, WindowErrors& errors, const LaplaceFit& first,
                      const std::string& discrepancy, uint64_t seed) {
-  const auto& names = RobotDiscrepancies();
-  if (std::find(names.begin(), names.end(), discrepancy) == names.end()) {
-    throw std::invalid_argument(fmt::format("there is no discrepancy '{}'; there are {}",
-                                            discrepancy, fmt::join(names, ", ")));
-  }
   const auto problem = std::make_shared<LeastSquares>(ProblemOf(robot, errors));
   const Eigen::VectorXd scale = first.scale;
   const Eigen::Index n = problem->prior.size(),

@@ -24,7 +24,7 @@ namespace plumb {
 ///                transition has made them
 /// Observed are zeros.
 /// @param errors, first must outlive the problem; noise's scale and slopes are first's.
-/// @throws std::invalid_argument for another name, naming the choices.
+/// @throws std::invalid_argument for another name.
 Problem RobotProblem(const RobotDescription& robot, WindowErrors& errors, const LaplaceFit& first,
                      const std::string& discrepancy, uint64_t seed);
 

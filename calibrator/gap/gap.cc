@@ -11,6 +11,7 @@
 #include "calibrator/fit/robot_draws.h"
 #include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/gap/disturbances.h"
+#include "calibrator/inference/gaussian_mixture.h"
 #include "robot/parameter_distribution.h"
 #include "sim/tasks/task.h"
 #include "sim/touch.h"
@@ -104,16 +105,20 @@ std::string Summarise(bool free, bool touching, const Gap& gap) {
   return text + parts;
 }
 
-// A posterior of another covariance than the method's.
-void Take(const MethodInput& input, const Gaussian& considered, GapFit* fit) {
+// A posterior of other covariances than the method's.
+void Take(const MethodInput& input, const GaussianMixture& considered, GapFit* fit) {
   const Eigen::VectorXd prior_precision =
       PriorGaussian(input.model->description()).covariance.diagonal().cwiseInverse();
-  const Eigen::Index n = considered.mean.size();
-  fit->information = considered.covariance.llt().solve(Eigen::MatrixXd::Identity(n, n));
+  const Eigen::MatrixXd covariance = Moments(considered).covariance;
+  const Eigen::Index n = covariance.rows();
+  fit->information = covariance.llt().solve(Eigen::MatrixXd::Identity(n, n));
   fit->information.diagonal() -= prior_precision;
-  fit->result.posterior = {{1}, {considered}};
+  fit->result.posterior = considered;
   Random random = SampleStream(input);
-  fit->result.samples = Transform(considered, StandardNormals(n, kPosteriorSamples, random));
+  fit->result.samples =
+      considered.components.size() == 1
+          ? Transform(considered.components[0], StandardNormals(n, kPosteriorSamples, random))
+          : Sample(considered, kPosteriorSamples, random);
 }
 
 // The method on a part of what was recorded. @return false if the model does not explain that,
@@ -156,8 +161,9 @@ bool LearnBesideContacts(const MethodInput& input, GapFit* fit) {
         InformingSteps(input.model, mean, input.rollouts, Informed::kBesideContacts);
     if (!LearnFrom({input.model, steps, input.options, mean}, Contacts::kSetAside, fit))
       return false;
-    Gaussian wider = Moments(fit->result.posterior);
-    wider.covariance *= kContactsLeave * kContactsLeave;
+    GaussianMixture wider = fit->result.posterior;
+    for (Gaussian& component : wider.components)
+      component.covariance *= kContactsLeave * kContactsLeave;
     Take(input, wider, fit);
     return true;
   } catch (const std::invalid_argument&) {

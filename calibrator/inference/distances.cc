@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "common/decompositions.h"
 #include "common/gaussian.h"
+#include "common/median.h"
 #include "common/special_numbers.h"
 
 namespace plumb {
@@ -29,14 +31,6 @@ double MeanDistance(const MatrixXd& x, const MatrixXd& y) {
   return sum / static_cast<double>(x.cols()) / static_cast<double>(y.cols());
 }
 
-double Median(VectorXd values) {
-  if (values.size() == 0) return 0;
-  const auto middle = values.begin() + values.size() / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  if (values.size() % 2 == 1) return *middle;
-  return (*middle + *std::max_element(values.begin(), middle)) / 2;
-}
-
 double MedianDistance(const MatrixXd& x) {
   // Of at most this many columns, spread evenly: the median of a bandwidth needs no more.
   constexpr Index kMost = 500;
@@ -45,8 +39,7 @@ double MedianDistance(const MatrixXd& x) {
   for (Index i = 0; i < x.cols(); i += stride) {
     for (Index j = 0; j < i; j += stride) distances.push_back((x.col(i) - x.col(j)).norm());
   }
-  const double median =
-      Median(Eigen::Map<const VectorXd>(distances.data(), static_cast<Index>(distances.size())));
+  const double median = Median(std::move(distances));
   return median > 0 ? median : 1;
 }
 
@@ -173,10 +166,13 @@ VectorXd MedianDeviation(const MatrixXd& outcomes) {
   for (Index j = 0; j < outcomes.cols(); ++j) {
     if (outcomes.col(j).allFinite()) finite.push_back(j);
   }
-  VectorXd deviation(outcomes.rows());
-  for (Index i = 0; i < outcomes.rows(); ++i) {
-    const VectorXd values = outcomes(i, finite).transpose();
-    deviation(i) = 1.4826 * Median((values.array() - Median(values)).abs());
+  VectorXd deviation = VectorXd::Zero(outcomes.rows());
+  for (Index i = 0; i < outcomes.rows() && !finite.empty(); ++i) {
+    std::vector<double> values;
+    for (const Index j : finite) values.push_back(outcomes(i, j));
+    const double centre = Median(values);
+    for (double& value : values) value = std::abs(value - centre);
+    deviation(i) = 1.4826 * Median(std::move(values));
   }
   return deviation;
 }
@@ -192,9 +188,7 @@ VectorXd RobustScale(const MatrixXd& outcomes, const VectorXd& observed) {
       if (outcomes.col(j).allFinite()) finite.push_back(outcomes(i, j));
     }
     if (finite.empty()) continue;
-    offset(i) = std::abs(
-        Median(Eigen::Map<const VectorXd>(finite.data(), static_cast<Index>(finite.size()))) -
-        observed(i));
+    offset(i) = std::abs(Median(std::move(finite)) - observed(i));
     far += offset(i) > 2 * deviation(i);
     ++compared;
   }

@@ -231,9 +231,7 @@ MixtureFit SelectMixture(const Eigen::MatrixXd& samples, const Eigen::VectorXd& 
   int failures = 0;
   for (int base = 2; base <= max_components && failures < 2; base *= 2) {
     for (const int components : {base, base + base / 2}) {
-      if ((components == base + base / 2 && base < 2) || components > max_components ||
-          failures == 2)
-        continue;
+      if (components > max_components || failures == 2) continue;
       MixtureFit fit = FitMixture(samples, weights, components, random, options);
       failures = fit.bic < best.bic ? 0 : failures + 1;
       if (fit.bic < best.bic) best = std::move(fit);

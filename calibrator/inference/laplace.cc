@@ -164,7 +164,6 @@ class Fit {
         damping = std::max(10 * damping, 1e-2);
       }
     }
-    if (jacobian_.size() == 0) Differentiate();  // no iteration was wanted
     noise_.Estimate(errors_, EffectiveParameters());
   }
 

@@ -142,6 +142,28 @@ size_t Count(const std::vector<int>& rollouts_per_iteration) {
 
 std::string RolloutFile(size_t index) { return fmt::format("rollout_{}.checkpoint", index); }
 
+std::vector<std::string> ParameterNames(const RobotDescription& robot) {
+  std::vector<std::string> names;
+  for (const ParameterDescription& p : robot.parameters) names.push_back(p.name);
+  return names;
+}
+
+// @throws std::runtime_error unless a calibration is of this robot, as its files are today.
+void RequireRobot(const json& j, const RobotDescription& robot) {
+  if (j.at("robot") != robot.name || j.at("parameters") != ParameterNames(robot))
+    throw std::runtime_error("is another robot's");
+  if (j.at("fingerprint") != robot.fingerprint) {
+    throw std::runtime_error(
+        "was made with another robot.toml or robot.urdf; choose another folder");
+  }
+}
+
+Rollout LoadRollout(const std::filesystem::path& file, const RobotDescription& robot) {
+  Rollout rollout = RolloutFrom(ReadJson(file));
+  RequireTransitions(rollout, robot);
+  return rollout;
+}
+
 // As the message that carries it, in hexadecimal digits; null if there is none.
 json ToJson(const std::shared_ptr<const Residual>& residual, const RobotDescription& robot) {
   if (!residual) return nullptr;
@@ -171,16 +193,19 @@ std::shared_ptr<const Residual> ResidualFrom(const json& j, const RobotDescripti
 
 }  // namespace
 
-std::vector<Rollout> LoadRollouts(const std::filesystem::path& folder) {
+std::vector<Rollout> LoadRollouts(const std::filesystem::path& folder,
+                                  const RobotDescription& robot) {
   std::vector<Rollout> rollouts;
   std::filesystem::path file = folder / kStateFile;
   if (!std::filesystem::exists(file)) return rollouts;
   try {
+    const json j = ReadJson(file);
+    RequireRobot(j, robot);
     // An earlier, longer run may have left more of them.
-    const size_t count = Count(WholeNumbers(ReadJson(file).at("rollouts_per_iteration")));
+    const size_t count = Count(WholeNumbers(j.at("rollouts_per_iteration")));
     while (rollouts.size() < count) {
       file = folder / RolloutFile(rollouts.size());
-      rollouts.push_back(RolloutFrom(ReadJson(file)));
+      rollouts.push_back(LoadRollout(file, robot));
     }
     return rollouts;
   } catch (const std::exception& error) {
@@ -191,7 +216,6 @@ std::vector<Rollout> LoadRollouts(const std::filesystem::path& folder) {
 CalibrationCheckpoint::CalibrationCheckpoint(std::filesystem::path folder,
                                              const RobotDescription& robot, uint64_t seed)
     : folder_(std::move(folder)), robot_(robot), seed_(seed) {
-  for (const ParameterDescription& p : robot.parameters) parameters_.push_back(p.name);
   std::error_code error;
   std::filesystem::create_directories(folder_, error);
   if (error) throw std::runtime_error(folder_.string() + ": " + error.message());
@@ -206,12 +230,13 @@ void CalibrationCheckpoint::Save(const SimOpt::State& state) {
               ToJson(state.rollouts[saved_rollouts_ - forgotten]));
   }
   const json j{{"robot", robot_.name},
-               {"parameters", parameters_},
+               {"parameters", ParameterNames(robot_)},
                {"seed", seed_},
                {"fingerprint", robot_.fingerprint},
                {"iteration", state.iteration},
                {"update", state.search.update},
                {"distribution", ToJson(state.distribution)},
+               {"method", state.method},
                {"used", state.used},
                {"before", ToJson(state.before)},
                {"kl", state.kl},
@@ -234,17 +259,12 @@ std::optional<SimOpt::State> CalibrationCheckpoint::Load() const {
   if (!std::filesystem::exists(file)) return {};
   try {
     const json j = ReadJson(file);
-    if (j.at("robot") != robot_.name || j.at("parameters") != parameters_)
-      throw std::runtime_error("is another robot's");
+    RequireRobot(j, robot_);
     if (j.at("seed") != seed_) throw std::runtime_error("has another seed; choose another folder");
-    if (j.at("fingerprint") != robot_.fingerprint) {
-      throw std::runtime_error(
-          "was made with another robot.toml or robot.urdf; choose another folder");
-    }
     SimOpt::State state;
     state.iteration = Whole(j.at("iteration"));
     state.distribution = MixtureFrom(j.at("distribution"));
-    state.used = j.at("used");
+    state.method = j.at("method"), state.used = j.at("used");
     state.before = MixtureFrom(j.at("before"));
     state.kl = j.at("kl"), state.ess = NumberOrNaN(j.at("ess")),
     state.temperature = j.at("temperature");
@@ -265,8 +285,7 @@ std::optional<SimOpt::State> CalibrationCheckpoint::Load() const {
     if (state.forgotten < 0) throw std::runtime_error("forgotten: less than none");
     for (auto i = static_cast<size_t>(state.forgotten); i < count; ++i) {
       file = folder_ / RolloutFile(i);
-      state.rollouts.push_back(RolloutFrom(ReadJson(file)));
-      RequireTransitions(state.rollouts.back(), robot_);
+      state.rollouts.push_back(LoadRollout(file, robot_));
     }
     return state;
   } catch (const std::exception& error) {

@@ -24,13 +24,13 @@ class CalibrationCheckpoint {
  private:
   std::filesystem::path folder_;
   RobotDescription robot_;
-  std::vector<std::string> parameters_;
   uint64_t seed_;
   size_t saved_rollouts_ = 0;
 };
 
 /// The roll-outs of a checkpoint folder's calibration, in order; none if there is no checkpoint.
-/// @throws std::runtime_error naming the file if one is damaged or missing.
-std::vector<Rollout> LoadRollouts(const std::filesystem::path& folder);
+/// @throws std::runtime_error naming the file if one is damaged, missing or another robot's.
+std::vector<Rollout> LoadRollouts(const std::filesystem::path& folder,
+                                  const RobotDescription& robot);
 
 }  // namespace plumb

@@ -65,12 +65,19 @@ SimOpt::SimOpt(const RobotDescription& robot, uint64_t seed, int threads, const 
       prior_(PriorGaussian(robot)),
       discrepancy_(robot, threads) {
   RequireMethod(method);
+  state_.method = method_;
   state_.distribution = state_.before = {{1}, {prior_}};
 }
 
 SimOpt::~SimOpt() = default;
 
 void SimOpt::Resume(State state) {
+  if (state.method != method_) {
+    throw std::invalid_argument(fmt::format(
+        "the checkpoint was made by method {}, not {}: choose another folder, or delete "
+        "it",
+        state.method, method_));
+  }
   for (const GaussianMixture* mixture : {&state.distribution, &state.before}) {
     for (const Gaussian& component : mixture->components) {
       if (component.mean.size() == prior_.mean.size() &&

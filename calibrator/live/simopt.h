@@ -82,7 +82,8 @@ class SimOpt {
 
   /// Everything a resumed run needs, apart from the robot.
   struct State {
-    int iteration = 0;  ///< completed iterations
+    int iteration = 0;   ///< completed iterations
+    std::string method;  ///< that was asked for
     GaussianMixture distribution;
     /// method that gave the distribution, e.g. laplace where auto was asked for; "prior" = none yet
     std::string used = "prior";
@@ -117,7 +118,8 @@ class SimOpt {
   uint64_t seed() const { return seed_; }
   const std::string& method() const { return method_; }
   const State& state() const { return state_; }
-  /// Takes up an earlier state. @throws std::invalid_argument if it is not of this robot.
+  /// Takes up an earlier state. @throws std::invalid_argument if it is not of this robot, or of
+  /// another method.
   void Resume(State state);
 
   /// Begins an iteration with the roll-outs of the newest policy. They may hold no usable

@@ -9,6 +9,7 @@
 
 #include "calibrator/motion/differences.h"
 #include "calibrator/motion/motion_table.h"
+#include "common/median.h"
 #include "common/special_numbers.h"
 
 namespace plumb {
@@ -48,13 +49,6 @@ bool Near(const MotionRow& row, const MotionRow& next, const Eigen::VectorXd& wi
     compared = true;
   }
   return compared;
-}
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return kNaN;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // How far from what the row before led to a state may be, coordinate by coordinate; empty if the
@@ -140,11 +134,7 @@ class Assembly {
   }
 
   /// [s] from row to row where that was not a control period: the median.
-  double late_interval() {
-    const auto middle = late_.begin() + static_cast<std::ptrdiff_t>(late_.size() / 2);
-    std::nth_element(late_.begin(), middle, late_.end());
-    return *middle;
-  }
+  double late_interval() const { return Median(late_); }
 
  private:
   bool IsLate(double interval) const {

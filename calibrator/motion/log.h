@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -17,5 +18,13 @@ struct Log {
   /// joints whose velocities are but differences of their positions: DifferencedJoints
   std::vector<std::string> differenced = {};
 };
+
+/// Of all logs, in their order.
+inline std::vector<Rollout> RolloutsOf(std::span<const Log> logs) {
+  std::vector<Rollout> rollouts;
+  for (const Log& log : logs)
+    rollouts.insert(rollouts.end(), log.rollouts.begin(), log.rollouts.end());
+  return rollouts;
+}
 
 }  // namespace plumb

@@ -14,6 +14,7 @@
 #include "common/nearest_name.h"
 #include "common/special_numbers.h"
 #include "robot/configuration_space.h"
+#include "robot/coordinate_names.h"
 #include "robot/physical.h"
 #include "sim/tasks/task.h"
 
@@ -23,30 +24,25 @@ namespace {
 constexpr double kLatest = 1e12;           // [s]; Unix time in nanoseconds is none
 constexpr double kBeyondLimit = 1 + 1e-9;  // an effort so far beyond its limit is not just rounded
 
+std::vector<std::string> Prefixed(const char* prefix, std::vector<std::string> names) {
+  for (std::string& name : names) name.insert(0, prefix);
+  return names;
+}
+
 /// The columns' names, in the order of q, v and the actions.
 struct Names {
   std::vector<std::string> q, v, u, target, kp, kd;
 
   explicit Names(const RobotDescription& robot) {
+    const CoordinateNames names(robot);
+    q = Prefixed("q/", names.q), v = Prefixed("v/", names.v);
     for (const JointDescription& joint : robot.joints) {
-      if (joint.type == JointDescription::Type::kSpherical) {
-        for (const char* part : {"/w", "/x", "/y", "/z"}) q.push_back("q/" + joint.name + part);
-        for (const char* part : {"/x", "/y", "/z"}) v.push_back("v/" + joint.name + part);
-      } else {
-        q.push_back("q/" + joint.name);
-        v.push_back("v/" + joint.name);
-      }
       if (joint.passive) continue;
       u.push_back("u/" + joint.name), target.push_back("target_q/" + joint.name);
       kp.push_back("kp/" + joint.name), kd.push_back("kd/" + joint.name);
     }
   }
 };
-
-std::vector<std::string> Prefixed(std::vector<std::string> names) {
-  for (std::string& name : names) name.insert(0, "next_");
-  return names;
-}
 
 /// Where things are in a table; -1 if there is no such column.
 struct Columns {
@@ -104,7 +100,8 @@ bool HasAny(const CsvReader& table, const std::vector<std::string>& names) {
 }
 
 Columns FindColumns(const CsvReader& table, const Names& names, const std::string& robot) {
-  const std::vector<std::string> next_q = Prefixed(names.q), next_v = Prefixed(names.v);
+  const std::vector<std::string> next_q = Prefixed("next_", names.q),
+                                 next_v = Prefixed("next_", names.v);
   std::vector<std::string> known;
   for (const auto* some :
        {&names.q, &names.v, &names.u, &names.target, &names.kp, &names.kd, &next_q, &next_v}) {

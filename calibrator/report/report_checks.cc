@@ -9,6 +9,7 @@
 #include "calibrator/report/report_plots.h"
 #include "plot/html.h"
 #include "plot/svg.h"
+#include "robot/coordinate_names.h"
 
 namespace plumb {
 
@@ -71,14 +72,15 @@ std::string GapPanel(const Gap& gap, const RobotDescription& robot) {
   Table table({"joint", "steps", "error of one step", "with the residual", "of readings alone",
                "explained"});
   std::string drawings;
+  const std::vector<std::string> names = CoordinateNames(robot).v;
   for (const auto& [condition, quality] :
        {std::pair{"free", &gap.free}, {"touching", &gap.touching}}) {
     const Eigen::VectorXd explained = Explained(*quality);
     if (explained.size() == 0) continue;
     drawings += ErrorsLeftPlot(*quality, robot, condition);
     for (Eigen::Index i = 0; i < explained.size(); ++i) {
-      const JointDescription& joint = robot.joints[static_cast<size_t>(i)];
-      table.Add({Escape(joint.name), fmt::format("{} {}", quality->transitions, condition),
+      table.Add({Escape(names[static_cast<size_t>(i)]),
+                 fmt::format("{} {}", quality->transitions, condition),
                  Number(quality->before(i), NAN), Number(quality->after(i), NAN),
                  Number(quality->claimed(i) > 0 ? quality->claimed(i) : NAN, NAN),
                  fmt::format("{:.0f} %", 100 * explained(i))});

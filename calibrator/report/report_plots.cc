@@ -9,6 +9,7 @@
 
 #include "plot/curves.h"
 #include "plot/svg.h"
+#include "robot/coordinate_names.h"
 
 namespace plumb {
 namespace {
@@ -202,10 +203,11 @@ std::string ErrorsLeftPlot(const ResidualQuality& quality, const RobotDescriptio
   Svg svg(kNames + kWidth, bottom + 44, "what the residual leaves of the errors, " + condition);
   const Axis x(0, 1, kNames + 10, kNames + kRight), y(0, 1, bottom, kTop);
   svg.Frame(x, y, condition + ", error left", "", 4);
+  const std::vector<std::string> names = CoordinateNames(robot).v;
   for (Eigen::Index i = 0; i < count; ++i) {
     const double at = kTop + 3 + kRow * (static_cast<double>(i) + 0.5),
                  before = std::max(quality.before(i), 1e-300);
-    svg.Text(kNames + 4, at + 4, Shorten(robot.joints[static_cast<size_t>(i)].name, 18), "tick",
+    svg.Text(kNames + 4, at + 4, Shorten(names[static_cast<size_t>(i)], 18), "tick",
              Svg::Anchor::kEnd);
     const double left = std::min(1.0, quality.after(i) / before),
                  readings = std::min(1.0, quality.claimed(i) / before);

@@ -54,7 +54,7 @@ int Serve(plumb::Process& process, const Flags& flags) {
   plumb::UmbridgeServer server(
       listen, {},
       {{"next_states", static_cast<Eigen::Index>(robot.parameters.size()), outputs, evaluate}});
-  std::cout << "http://" << listen.address << ":" << server.port() << std::endl;
+  std::cout << server.url() << std::endl;
   server.Run(process.stop_fd(), [&] { return process.stopping(); });
   return 0;
 }

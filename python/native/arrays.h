@@ -15,6 +15,8 @@
 #include <utility>
 #include <vector>
 
+#include "python/native/matrix.h"
+
 // What comes from Python and goes there. With the GIL held.
 namespace plumb::python {
 
@@ -22,8 +24,6 @@ namespace py = pybind11;
 
 template <class T>
 using Array = py::array_t<T, py::array::c_style | py::array::forcecast>;
-template <class T>
-using Matrix = Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 constexpr py::ssize_t kAny = -1;  // a length that is not asked for
 
 using Shape = std::span<const py::ssize_t>;

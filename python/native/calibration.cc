@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 #include <pybind11/functional.h>
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 #include <algorithm>
 #include <ctime>
+#include <filesystem>
 #include <limits>
 #include <optional>
 
@@ -32,7 +34,7 @@ threads   0 = one per core; the result does not depend on it
 progress  is called as progress(what, share), share from 0 to 1, from this thread; what it raises
           ends the calibration
 Ctrl-C ends it, too. Other Python threads run meanwhile. ValueError for an unknown method or
-motions that cannot be used.
+discrepancy, or motions that cannot be used.
 )";
 
 constexpr int kMostHorizon = 1000;
@@ -93,7 +95,6 @@ Calibration Run(std::shared_ptr<Robot> robot, const py::object& motions, const s
   const RobotDescription& description = robot->description();
   const std::vector<Log> logs = LogsOf(motions, description);
   CalibrationOptions options;
-  RequireMethod(method);
   options.method = method, options.seed = seed, options.discrepancy = discrepancy;
   if (horizons.empty()) throw py::value_error("horizons: is empty");
   for (const int horizon : horizons) InRange("horizons", horizon, 1, kMostHorizon);
@@ -106,10 +107,8 @@ Calibration Run(std::shared_ptr<Robot> robot, const py::object& motions, const s
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
     if (progress) (*progress)(what, share);
   };
-  Findings findings = [&] {
-    const py::gil_scoped_release released;
-    return Calibrate(description, logs, options);
-  }();
+  const py::gil_scoped_release released;
+  Findings findings = Calibrate(description, logs, options);
   Summary summary = Summarise(findings, description);
   return {std::move(robot), std::move(findings),
           ProvenanceOf(logs, options, "plumbline.calibrate", std::time(nullptr)),
@@ -127,10 +126,7 @@ std::string Repr(const Calibration& self) {
   return text + ">";
 }
 
-}  // namespace
-
-void BindCalibration(py::module_& module) {
-  py::class_<Calibration> calibration(module, "Calibration", kHelp);
+void BindNumbers(py::class_<Calibration>& calibration) {
   const auto numbers = [&](const char* name, auto get, const char* help) {
     calibration.def_property_readonly(
         name, [get](const Calibration& self) { return ToArray(get(self.summary)); }, help);
@@ -152,6 +148,9 @@ void BindCalibration(py::module_& module) {
   numbers(
       "samples", [](const Summary& s) { return Eigen::MatrixXd(s.samples.transpose()); },
       "Of the posterior, equally weighted, shape (N, parameters).");
+}
+
+void BindFindings(py::class_<Calibration>& calibration) {
   const auto finding = [&](const char* name, auto get, const char* help) {
     calibration.def_property_readonly(
         name, [get](const Calibration& self) { return get(self.findings); }, help);
@@ -174,6 +173,14 @@ void BindCalibration(py::module_& module) {
   finding("findings", &Words, "In words, those that the command prints.");
   finding(
       "warnings", [](const Findings& f) { return f.warnings; }, "In words.");
+}
+
+}  // namespace
+
+void BindCalibration(py::module_& module) {
+  py::class_<Calibration> calibration(module, "Calibration", kHelp);
+  BindNumbers(calibration);
+  BindFindings(calibration);
   calibration
       .def_property_readonly(
           "names",
@@ -195,18 +202,18 @@ void BindCalibration(py::module_& module) {
       .def("json", &Calibration::Json, "The text of posterior.json (docs/posterior.md).")
       .def(
           "save",
-          [](const Calibration& self, const std::string& file) {
+          [](const Calibration& self, const std::filesystem::path& file) {
             WritePosterior(file, self.findings, self.robot->description(), self.provenance);
           },
-          py::arg("file"),
+          py::arg("file"), Unlocked(),
           "Writes posterior.json, atomically: all of it but its last object, run, is the same to "
           "the byte as the command's.")
       .def("__repr__", &Repr);
-  module.def("calibrate", &Run, py::arg("robot"), py::arg("motions"), py::arg("method") = "auto",
-             py::arg("seed") = 1, py::arg("horizons") = std::vector{1, 5, 10, 50},
-             py::arg("budget") = 100'000, py::arg("discrepancy") = "likelihood",
-             py::arg("residual") = true, py::arg("threads") = 0, py::arg("progress") = py::none(),
-             kCalibrateHelp);
+  module.def("calibrate", &Run, py::arg("robot").none(false), py::arg("motions"),
+             py::arg("method") = "auto", py::arg("seed") = 1,
+             py::arg("horizons") = std::vector{1, 5, 10, 50}, py::arg("budget") = 100'000,
+             py::arg("discrepancy") = "likelihood", py::arg("residual") = true,
+             py::arg("threads") = 0, py::arg("progress") = py::none(), kCalibrateHelp);
 }
 
 }  // namespace plumb::python

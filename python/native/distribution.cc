@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 #include <algorithm>
+#include <filesystem>
 
 #include "python/native/arrays.h"
 #include "robot/physics_fingerprint.h"
@@ -119,19 +121,17 @@ void BindDistribution(py::module_& module) {
         auto of = ParameterDistribution::Prior(robot->description());
         return Distribution{std::move(robot), std::move(of)};
       },
-      py::arg("robot"), "The robot's prior.");
+      py::arg("robot").none(false), "The robot's prior.");
   module.def(
       "load_posterior",
-      [](const std::string& file, std::shared_ptr<Robot> robot) {
+      [](const std::filesystem::path& file, std::shared_ptr<Robot> robot) {
         auto of = ReadSimulators(file, robot->description());
         return Distribution{std::move(robot), std::move(of)};
       },
-      py::arg("file"), py::arg("robot"),
+      py::arg("file"), py::arg("robot").none(false), Unlocked(),
       "Reads a posterior.json that plumb calibrate, Calibration.save or a run has written, with "
-      "what "
-      "it says that these simulators lack. RuntimeError names the file and the field that is "
-      "wrong, "
-      "or another robot's.");
+      "what it says that these simulators lack. RuntimeError names the file and the field that is "
+      "wrong, or another robot's.");
 }
 
 }  // namespace plumb::python

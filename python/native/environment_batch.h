@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "python/native/groups.h"
+#include "python/native/matrix.h"
 #include "sim/environment.h"
 #include "sim/simulator_lanes.h"
 #include "trainer/workers.h"
@@ -19,9 +20,6 @@ namespace plumb::python {
 /// companions. Used by one thread at a time.
 class EnvironmentBatch {
  public:
-  template <class T>
-  using Matrix = Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
   /// All in the zero state, with the prior's means as parameters.
   /// @param count > 0. @param threads 0 = as many as the machine has cores.
   EnvironmentBatch(std::shared_ptr<const Model> model, int count, int threads);

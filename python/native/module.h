@@ -19,6 +19,9 @@ struct Robot {
   std::shared_ptr<const Model> model;
 };
 
+/// Of functions that read or write a file: other Python threads run meanwhile.
+using Unlocked = pybind11::call_guard<pybind11::gil_scoped_release>;
+
 void BindRobot(pybind11::module_& module);
 void BindSimulation(pybind11::module_& module);
 void BindPlay(pybind11::module_& module);

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
+#include <filesystem>
 #include <optional>
 
 #include "calibrator/fit/step_errors.h"
@@ -73,6 +75,7 @@ Motion MotionOf(std::shared_ptr<Robot> robot, const py::object& t, const py::obj
   if (next_q) columns.next_q = Column("next_q", *next_q, n);
   if (next_v) columns.next_v = Column("next_v", *next_v, m);
   columns.ends = Ends(terminated, truncated, columns.t.size());
+  const py::gil_scoped_release released;
   Log log = JoinMotion(name, MakeMotionTable(columns, description), description);
   return {std::move(robot), std::move(log)};
 }
@@ -112,11 +115,8 @@ std::string Repr(const Motion& motion) {
 
 using Read = Log (*)(const std::string& file, const RobotDescription& robot);
 
-Motion ReadMotion(Read read, const std::string& file, std::shared_ptr<Robot> robot) {
-  Log log = [&] {
-    const py::gil_scoped_release released;
-    return read(file, robot->description());
-  }();
+Motion ReadMotion(Read read, const std::filesystem::path& file, std::shared_ptr<Robot> robot) {
+  Log log = read(file.string(), robot->description());
   return {std::move(robot), std::move(log)};
 }
 
@@ -144,24 +144,24 @@ void BindMotion(py::module_& module) {
           "warnings", [](const Motion& m) { return m.log.warnings; },
           "Parts that could not be used, in words.")
       .def("__repr__", &Repr);
-  module.def("motion", &MotionOf, py::arg("robot"), py::kw_only(), py::arg("t"), py::arg("q"),
-             py::arg("v"), py::arg("u"), py::arg("next_q") = py::none(),
+  module.def("motion", &MotionOf, py::arg("robot").none(false), py::kw_only(), py::arg("t"),
+             py::arg("q"), py::arg("v"), py::arg("u"), py::arg("next_q") = py::none(),
              py::arg("next_v") = py::none(), py::arg("terminated") = py::none(),
              py::arg("truncated") = py::none(), py::arg("name") = "arrays", kMotionHelp);
   module.def(
       "read_csv",
-      [](const std::string& file, std::shared_ptr<Robot> robot) {
+      [](const std::filesystem::path& file, std::shared_ptr<Robot> robot) {
         return ReadMotion(&ReadCsvLog, file, std::move(robot));
       },
-      py::arg("file"), py::arg("robot"),
+      py::arg("file"), py::arg("robot").none(false), Unlocked(),
       "Reads a table of motion, as plumb calibrate --csv does. RuntimeError names file, line and "
       "what is wrong.");
   module.def(
       "read_lcm",
-      [](const std::string& file, std::shared_ptr<Robot> robot) {
+      [](const std::filesystem::path& file, std::shared_ptr<Robot> robot) {
         return ReadMotion(&ReadLcmLog, file, std::move(robot));
       },
-      py::arg("file"), py::arg("robot"),
+      py::arg("file"), py::arg("robot").none(false), Unlocked(),
       "Reads the motion that an LCM log has recorded, as plumb calibrate --log does. RuntimeError "
       "names the file and what is wrong.");
 }

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "python/native/arrays.h"
+#include "python/native/interruption.h"
 #include "python/native/module.h"
 #include "python/native/policy.h"
 #include "sim/episode.h"
@@ -19,6 +20,7 @@ policy       whose mean actions are taken; random=True: random actions; default:
 seed         of all random numbers; episode i depends on it and on i alone
 parameters   shape (parameters,), physical units; default: the prior's means
 threads      0 = as many as the machine has cores; the result does not depend on it
+Ctrl-C ends it. Other Python threads run meanwhile.
 
 t            [s] since the episode began, shape (N,)
 q, v         the state before the step, shapes (N, num_positions) [rad or m], (N, num_velocities)
@@ -85,6 +87,7 @@ py::list Play(const Robot& robot, const Policy* policy, bool random, int episode
   if (!parameters.is_none())
     physical = AsMatrix(Numbers<double>("parameters", parameters, {{physical.size()}}));
   Threads(threads);
+  Interruption interruption;
   {
     const py::gil_scoped_release released;
     Workers workers(threads);
@@ -94,6 +97,7 @@ py::list Play(const Robot& robot, const Policy* policy, bool random, int episode
       environments.back().SetParameters(physical);
     }
     workers.Run(episodes, [&](int episode, int worker) {
+      if (interruption.came()) return;
       Recording& recording = recordings[static_cast<size_t>(episode)];
       PlayEpisode(
           environments[static_cast<size_t>(worker)], robot.description(), actor, seed,
@@ -101,6 +105,7 @@ py::list Play(const Robot& robot, const Policy* policy, bool random, int episode
           [] { return false; });
     });
   }
+  interruption.Raise();
   py::list all;
   for (const Recording& recording : recordings) all.append(recording.ToDict());
   return all;

@@ -1,12 +1,16 @@
 #include "python/native/policy.h"
 
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
+#include <filesystem>
+#include <stdexcept>
 #include <vector>
 
 #include "common/ranks.h"
 #include "python/native/arrays.h"
 #include "python/native/distribution.h"
+#include "python/native/interruption.h"
 #include "sim/tasks/task.h"
 #include "trainer/policy_file.h"
 #include "trainer/robot_simulation.h"
@@ -37,7 +41,7 @@ distribution  of the simulators; default: the robot's prior
 threads       0 = as many as the machine has cores; the result does not depend on it
 nan stands for an episode that was not finite, or had parameters of which there is no simulator.
 The simulators are those on which `plumb train --seed` has evaluated the policy after training: the
-same returns.
+same returns. Ctrl-C ends it. Other Python threads run meanwhile.
 )";
 
 constexpr uint32_t kActionStream = 0x41435450;  // "ACTP", second word of the random streams
@@ -67,6 +71,7 @@ Array<double> Evaluate(const Policy& self, const Distribution* distribution, int
   InRange("episodes", episodes, 0, kMostEpisodes), Threads(threads);
   if (distribution) RequireSameRobot("distribution", *distribution, *self.robot);
   std::vector<double> returns;
+  Interruption interruption;
   {
     const py::gil_scoped_release released;
     const RobotDescription& robot = self.robot->description();
@@ -74,10 +79,14 @@ Array<double> Evaluate(const Policy& self, const Distribution* distribution, int
         distribution ? distribution->of : ParameterDistribution::Prior(robot);
     Workers workers(threads);
     RolloutSampler sampler(SimulateRobot(robot), self.gaussian.shape(), workers, Ranks::Alone());
-    returns = sampler.Returns(
-        self.gaussian, [&](Random& random) { return of.Draw(random); }, episodes, seed,
-        kHeldOutStream, 0);
+    const ParameterSampler draw = [&](Random& random) {
+      // An episode without a simulator is not played.
+      if (interruption.came()) throw std::invalid_argument("interrupted");
+      return of.Draw(random);
+    };
+    returns = sampler.Returns(self.gaussian, draw, episodes, seed, kHeldOutStream, 0);
   }
+  interruption.Raise();
   return Array<double>(static_cast<py::ssize_t>(returns.size()), returns.data());
 }
 
@@ -117,12 +126,12 @@ void BindPolicy(py::module_& module) {
           "Standard deviation of sampled actions, shape (actions,), policy units.");
   module.def(
       "load_policy",
-      [](const std::string& file, std::shared_ptr<Robot> robot) {
+      [](const std::filesystem::path& file, std::shared_ptr<Robot> robot) {
         const auto task = MakeTask(robot->description());
-        auto gaussian = LoadPolicy(file, robot->description(), *task);
+        auto gaussian = LoadPolicy(file.string(), robot->description(), *task);
         return Policy{std::move(robot), std::move(gaussian)};
       },
-      py::arg("file"), py::arg("robot"),
+      py::arg("file"), py::arg("robot").none(false), Unlocked(),
       "Reads a policy from an ONNX model that Plumbline has written, or from a trainer's "
       "checkpoint: of several the one that the robot is to be run with. ValueError or RuntimeError "
       "names the file if it is none, damaged, or of another robot or task.");

@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 #include <cmath>
+#include <filesystem>
 #include <utility>
 
 #include "python/native/arrays.h"
@@ -114,8 +116,9 @@ void BindRobot(py::module_& module) {
       "Parts of the files that have no effect.");
   robot.def("__repr__", [](const Robot& self) { return Repr(self); });
   module.def(
-      "load_robot", [](const std::string& path) { return std::make_shared<Robot>(path); },
-      py::arg("path"), kLoadHelp);
+      "load_robot",
+      [](const std::filesystem::path& path) { return std::make_shared<Robot>(path.string()); },
+      py::arg("path"), Unlocked(), kLoadHelp);
 }
 
 }  // namespace plumb::python

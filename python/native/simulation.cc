@@ -57,11 +57,15 @@ with reset alone.
 constexpr int kMostEnvironments = 10'000'000;
 constexpr uint32_t kMostNumber = std::numeric_limits<uint32_t>::max();
 
+std::shared_ptr<EnvironmentBatch> MakeBatch(const Robot& robot, int count, int threads) {
+  const py::gil_scoped_release released;
+  return std::make_shared<EnvironmentBatch>(robot.model, count, threads);
+}
+
 class Simulation {
  public:
   Simulation(const Robot& robot, int count, int threads)
-      : batch_(std::make_shared<EnvironmentBatch>(
-            robot.model, InRange("count", count, 1, kMostEnvironments), Threads(threads))) {
+      : batch_(MakeBatch(robot, InRange("count", count, 1, kMostEnvironments), Threads(threads))) {
     // What it has lent outlives it.
     const py::capsule owner(new std::shared_ptr<EnvironmentBatch>(batch_), [](void* batch) {
       delete static_cast<std::shared_ptr<EnvironmentBatch>*>(batch);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "python/native/groups.h"
+#include "python/native/matrix.h"
 #include "robot/parameter_distribution.h"
 #include "trainer/rollout.h"
 #include "trainer/workers.h"
@@ -18,9 +19,6 @@ namespace plumb::python {
 /// a policy's evaluation on kHeldOutStream. Used by one thread at a time.
 class TaskBatch {
  public:
-  template <class T>
-  using Matrix = Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
   /// @param count > 0. @param threads 0 = as many as the machine has cores.
   /// @throws std::invalid_argument, see SimulateRobot.
   TaskBatch(const RobotDescription& robot, ParameterDistribution distribution, int count,

@@ -1,4 +1,5 @@
 #include <mutex>
+#include <utility>
 
 #include "python/native/arrays.h"
 #include "python/native/at_work.h"
@@ -19,16 +20,22 @@ call writes over.
 
 constexpr int kMostSimulations = 10'000'000;
 
-const ParameterDistribution DistributionOf(const Robot& robot, const Distribution* distribution) {
+ParameterDistribution DistributionOf(const Robot& robot, const Distribution* distribution) {
   if (!distribution) return ParameterDistribution::Prior(robot.description());
   RequireSameRobot("distribution", *distribution, robot);
   return distribution->of;
 }
 
+TaskBatch MakeTasks(const Robot& robot, ParameterDistribution distribution, int count,
+                    int threads) {
+  const py::gil_scoped_release released;
+  return TaskBatch(robot.description(), std::move(distribution), count, threads);
+}
+
 struct Batch {
   Batch(const Robot& robot, int count, const Distribution* distribution, int threads)
-      : tasks(robot.description(), DistributionOf(robot, distribution),
-              InRange("num_envs", count, 1, kMostSimulations), Threads(threads)) {}
+      : tasks(MakeTasks(robot, DistributionOf(robot, distribution),
+                        InRange("num_envs", count, 1, kMostSimulations), Threads(threads))) {}
 
   TaskBatch tasks;
   std::mutex mutex;
@@ -59,8 +66,7 @@ void BindTaskBatch(py::module_& module) {
           },
           py::arg("actions"), py::arg("same_step"),
           "One control period of all; where an episode is over the next begins, at once or with "
-          "the "
-          "next step.");
+          "the next step.");
   const auto view = [&](const char* name, auto member, const char* help) {
     batch.def_property_readonly(
         name,

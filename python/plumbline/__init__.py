@@ -10,7 +10,8 @@ VectorEnv    the task for reinforcement learning               read_log        a
 
 Arrays are numpy's. Quantities are in SI units: q [rad or m], v [rad/s or m/s], efforts [Nm or N]. All results are the same
 bits for any number of threads, and as those of the command `plumb`. What is wrong with an argument is a ValueError that
-names it; what is wrong with a file, a RuntimeError with the message that the command prints.
+names it, and one of another type, or a seed below 0, a TypeError; what is wrong with a file is a RuntimeError with the
+message that the command prints. Files are named by a str or a pathlib.Path.
 """
 from plumb_log import read_log
 

@@ -13,8 +13,11 @@ namespace plumb {
 /// velocity and rate in its own axes, g the direction of gravity there, e = v - commanded:
 ///   observation  g; u; w; height [m]; each driven joint's angle from its rest; its speed
 ///   reward       per step at whose end it has not fallen, after Rudin et al., "Learning to walk in
-///                minutes using massively parallel deep reinforcement learning", CoRL 2021, table 4
-///                and the code's weights (legged_gym, legged_robot_config.py):
+///                minutes using massively parallel deep reinforcement learning", CoRL 2021, table
+///                4, with legged_gym's weights: those of legged_robot_config.py, but for the
+///                orientation's, of anymal_c_flat_config.py, and the torque's, of a1_config.py. The
+///                last term is ours. Its air time of the feet, changes of actions and collisions
+///                do not count here, and a sum below zero stays one:
 ///                  exp(-|e_xy|^2 / 0.25) + 0.5 exp(-e_turn^2 / 0.25)
 ///                  - 2 u_z^2 - 0.05 (w_x^2 + w_y^2) - 5 (g_x^2 + g_y^2)
 ///                  - 2e-4 sum torque^2 - 2.5e-7 sum acceleration^2 - 0.1 mean (angle - rest)^2

@@ -29,6 +29,8 @@ struct Box {
   Eigen::Vector2d size() const { return high - low; }
 };
 
+constexpr double kLowest = 0.1;  // [m] that a picture is high: a robot may have no extent
+
 /// The part of the world that a picture shows, chosen from all that a film shows.
 class Framing {
  public:
@@ -44,6 +46,7 @@ class Framing {
     // A robot that stays within two of its widths is watched from one place.
     follows_ = all_.size().x() > 2 * widest + 0.5;
     all_.Add({all_.low.x(), 0});  // the ground is in the picture
+    if (all_.size().y() < kLowest) all_.Add({all_.low.x(), all_.low.y() + kLowest});
     width_ = (follows_ ? widest : all_.size().x()) + 0.1 * all_.size().y();
     if (robot_.joints.empty()) width_ = 1;
   }
@@ -234,10 +237,13 @@ std::string DrawFilm(const RobotDescription& robot, const std::vector<Snapshot>&
       std::min(kHeight / (framing.top() - framing.bottom()), kWidest / framing.width());
   const double height = std::ceil(scale * (framing.top() - framing.bottom()));
   const double width = std::clamp(std::ceil(scale * framing.width()), kNarrowest, kWidest);
+  // At each frame's time the last snapshot: seldom ones are shown for longer.
   std::vector<const Snapshot*> frames;
-  for (const Snapshot& snapshot : film) {
-    if (snapshot.time >= static_cast<double>(frames.size()) * kFrame - 1e-9)
-      frames.push_back(&snapshot);
+  for (size_t last = 0;;) {
+    const double time = film.front().time + static_cast<double>(frames.size()) * kFrame + 1e-9;
+    while (last + 1 < film.size() && film[last + 1].time <= time) ++last;
+    frames.push_back(&film[last]);
+    if (last + 1 == film.size()) break;
   }
   const auto columns = static_cast<int>(width), rows = static_cast<int>(height + kTextHeight);
   const auto draw = [&](int frame, std::vector<uint32_t>& pixels) {

@@ -73,6 +73,8 @@ bool GearPlay::Advance(const PhysicsBackend::Vector& effort, double duration,
                        PhysicsBackend& engine) {
   const double count = std::ceil(duration / longest_step_ - 1e-6);
   const double h = count > 0 ? duration / count : 0;
+  const Eigen::VectorXd q = engine.q(), v = engine.v();
+  const std::vector<Gear> gears = gears_;
   for (int64_t step = 0; static_cast<double>(step) < count; ++step) {
     effort_ = effort;
     for (Gear& gear : gears_) {
@@ -85,7 +87,8 @@ bool GearPlay::Advance(const PhysicsBackend::Vector& effort, double duration,
       effort_[gear.velocity] = side * push;
     }
     if (!effort_.allFinite() || !engine.Advance(effort_, h)) {
-      Place(engine.q(), engine.v());
+      engine.SetState(q, v);
+      gears_ = gears;
       return false;
     }
     for (Gear& gear : gears_) {

@@ -43,8 +43,11 @@ class SimbodyPlant::Impl {
     if (!effort.allFinite()) return false;
     const double count = std::max(1.0, std::ceil(duration / max_step_ - 1e-6));
     const double h = duration / count;
+    const VectorXd q = q_, v = v_;
     for (int64_t i = 0; static_cast<double>(i) < count; ++i) {
-      if (!Step(effort, h)) return false;
+      if (Step(effort, h)) continue;
+      q_ = q, v_ = v;
+      return false;
     }
     return true;
   }

@@ -87,14 +87,12 @@ inline Findings SampleFindings(const RobotDescription& robot) {
       {{"pivot, at ground contact", "pivot", "contact", "structure", 12.5, 1e-6, 0.31},
        {"all joints", "", "", "whiteness", 3.1, 0.004, NAN}},
       "the model does not explain the robot: pivot, at ground contact"};
-  if (robot.num_positions() == robot.num_velocities()) {  // no spherical joint: there may be one
-    f.gap.informed = Informed::kFree;
-    f.gap.residual = std::make_shared<const Residual>(SampleResidual(robot));
-    f.gap.free.transitions = 700;
-    const Eigen::VectorXd one = Eigen::VectorXd::Ones(robot.num_velocities());
-    f.gap.touching = {295, 0.2 * one, 0.1 * one, 0.05 * one, 4};
-    f.gap.summary = "the model does not explain contact";
-  }
+  f.gap.informed = Informed::kFree;
+  f.gap.residual = std::make_shared<const Residual>(SampleResidual(robot));
+  f.gap.free.transitions = 700;
+  const Eigen::VectorXd one = Eigen::VectorXd::Ones(robot.num_velocities());
+  f.gap.touching = {295, 0.2 * one, 0.1 * one, 0.05 * one, 4};
+  f.gap.summary = "the model does not explain contact";
   f.agreement = {true,
                  {{"monday.lcm", f.samples.col(0), 0.05 * f.samples.col(0).cwiseAbs(), 1.2, 0.4},
                   {"tuesday.lcm", f.samples.col(1), 0.05 * f.samples.col(1).cwiseAbs(), 0.8, 0.7}},

@@ -120,12 +120,26 @@ TEST_CASE("ranks that share the work come to the same bits") {
   const std::string arguments =
       "calibrate " + Robot("hopper") + " --csv " + table + " --threads 1 --output ";
   REQUIRE(Shell(Plumb() + arguments + (folder / "one.json")).status == 0);
-  const Outcome three = Shell(
-      "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun --oversubscribe -n 3 " +
-      Plumb() + arguments + (folder / "three.json"));
+  const Outcome three = Shell(Mpirun(3) + Plumb() + arguments + (folder / "three.json"));
   INFO(three.text);
   REQUIRE(three.status == 0);
   CHECK(Posterior(folder / "three.json") == Posterior(folder / "one.json"));
+}
+
+TEST_CASE("a rank that is asked to stop does not let the others wait for it") {
+  if (Shell("command -v mpirun").status != 0) {
+    WARN("skipped: mpirun (openmpi-bin) is not installed");
+    return;
+  }
+  const TemporaryFolder folder;
+  const std::string one = Plumb() + "calibrate " + Robot("hopper") + " --csv " +
+                          HopperTable(folder, 4) + " --method reps --threads 1 --output " +
+                          (folder / "p.json");
+  const Outcome outcome = Shell(Mpirun(1) + one + " : -n 1 env --block-signal=TERM sh -c " +
+                                "'kill $$; exec " + one + "'");
+  INFO(outcome.text);
+  CHECK(outcome.status != 0);
+  CHECK(outcome.status != 124);  // timeout's
 }
 
 // A posterior whose residual has an input more than the robot.

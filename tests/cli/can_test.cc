@@ -83,6 +83,23 @@ TEST_CASE("can: usage") {
   CHECK(Shell(Plumb() + "can").status == 2);
   CHECK(Shell(Plumb() + "can plan").status == 2);
   CHECK(Shell(Plumb() + "can plan /nowhere").status == 1);
+  const Outcome level = Shell(Plumb() + "--log-level errror can plan " + Robot("hopper"));
+  CHECK(level.status == 2);
+  CHECK_THAT(level.text, Catch::Contains("errror"));
+}
+
+TEST_CASE("what was printed and could not be written is an error, but for a pipe that was closed") {
+  for (const std::string& command : {"can dbc " + Robot("hopper"), "can plan " + Robot("hopper"),
+                                     "sim " + Robot("pendulum"), std::string("--help")}) {
+    const Outcome full = Shell("(" + Plumb() + command + ") 2>&1 >/dev/full");
+    INFO(command);
+    CHECK(full.status == 1);
+    CHECK(full.text == "plumb: standard output cannot be written: No space left on device\n");
+  }
+  const std::string more_than_a_pipe_holds =
+      Plumb() + "sim " + Robot("hopper/gym.toml") + " --random --episodes 2000";
+  CHECK(Shell("{ " + more_than_a_pipe_holds + "; echo status $? >&2; } | head -n 1")
+            .text.find("status 0") != std::string::npos);
 }
 
 }  // namespace plumb

@@ -84,6 +84,16 @@ TEST_CASE("excite: of the falling hopper only what comes before the fall, in gym
   CHECK(std::count(csv.begin(), csv.end(), '\n') < 250);  // of 500
 }
 
+TEST_CASE("excite: can be interrupted while it computes") {
+  const TemporaryFolder folder;
+  const Outcome outcome =
+      ShellAskedToEnd(Plumb() + "excite " + Robot("hopper") +
+                      " --candidates 10000 --seconds 60 --output " + folder / "a.csv");
+  INFO(outcome.text);
+  CHECK(outcome.status == 130);
+  CHECK(Read(folder / "a.csv").empty());
+}
+
 TEST_CASE("excite: what cannot be done is said before anything is computed") {
   const TemporaryFolder folder;
   CHECK(Excite("pendulum", "--candidates 0").status != 0);

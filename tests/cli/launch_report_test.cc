@@ -39,6 +39,34 @@ TEST_CASE("a run's report says which policy runs and why, and what was learnt") 
   CHECK_THAT(page, !Contains("dropped"));
 }
 
+TEST_CASE("a run without any policy says nothing of one") {
+  nlohmann::json summary = SampleSummary();
+  summary["policy"] = nullptr;
+  summary["decisions"] = summary["evaluation_returns"] = nlohmann::json::array();
+  const std::string page = LaunchReport(LoadPendulum("robot.toml"), summary, "");
+  CHECK_NOTHROW(Xml(page, "page"));
+  CHECK_THAT(page, !Contains("runs since") && !Contains("Policies"));
+  CHECK_THAT(page, Contains("10.30 \xc2\xb1 0.20"));
+}
+
+TEST_CASE("policies and iterations of a run that went on keep their numbers") {
+  nlohmann::json summary = SampleSummary();
+  for (nlohmann::json& iteration : summary["iterations"])
+    iteration["iteration"] = iteration["iteration"].get<int>() + 30;
+  for (nlohmann::json& decision : summary["decisions"])
+    decision["policy"] = decision["policy"].get<int>() + 30;
+  const std::string page = LaunchReport(LoadPendulum("robot.toml"), summary, "");
+  const auto drawing = [&](const std::string& label) {
+    const size_t begin = page.find(label);
+    REQUIRE(begin != std::string::npos);
+    return page.substr(begin, page.find("</svg>", begin) - begin);
+  };
+  for (const char* policy : {">30<", ">31<", ">32<"})
+    CHECK_THAT(drawing("returns of the policies"), Contains(policy));
+  CHECK_THAT(drawing("returns of the policies"), !Contains(">0<"));
+  CHECK_THAT(drawing("what was learnt of gravity"), Contains(">30<"));
+}
+
 TEST_CASE("in a run's report, what is not known is left out or a dash") {
   nlohmann::json summary = SampleSummary();
   summary["hidden"] = nullptr;

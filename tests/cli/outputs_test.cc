@@ -69,9 +69,9 @@ TEST_CASE("only what is of the kind that is to be written is written over") {
 TEST_CASE("a recording that cannot be made again is not written over unasked") {
   const TemporaryFolder folder;
   const std::string log = folder / "run.lcmlog", recorded = "\xed\xa1\xda\x01 and so on";
-  const auto beside = [&](const std::string& json) {
+  const auto beside = [&](const std::string& text) {
     fs::create_directories(log + ".d");
-    std::ofstream(log + ".d/record.json") << json;
+    std::ofstream(log + ".d/record.json") << text;
   };
   CHECK_NOTHROW(RequireOverwritable("", "arm"));
   CHECK_NOTHROW(RequireOverwritable(log, ""));  // there is none

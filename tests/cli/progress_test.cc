@@ -128,6 +128,7 @@ TEST_CASE_METHOD(
 }
 
 TEST_CASE_METHOD(Fixture, "which policy runs, since when, and why") {
+  CHECK(progress.Summary({})["policy"].is_null());
   controller_status_t s{};
   s.phase = controller_status_t::COMPLETE;
   s.purpose = policy_t::CALIBRATE;

@@ -42,6 +42,17 @@ inline Outcome Shell(const std::string& command, const std::string& words = "") 
   return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text};
 }
 
+/// The same of a program that has been asked to end (SIGTERM) before it can look for it.
+inline Outcome ShellAskedToEnd(const std::string& command) {
+  return Shell("exec env --block-signal=TERM sh -c 'kill $$; exec " + command + "'");
+}
+
+/// In front of a program: starts so many ranks of it.
+inline std::string Mpirun(int ranks) {
+  return "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun --oversubscribe -n " +
+         std::to_string(ranks) + " ";
+}
+
 /// The program under test, with a space behind it, and the robots it comes with.
 inline std::string Plumb() { return std::string(std::getenv("PLUMBLINE_BUILD")) + "/bin/plumb "; }
 inline std::string Robot(const std::string& name) {

@@ -174,6 +174,23 @@ TEST_CASE("an interrupted training goes on to the same bits, with any number of 
   }
 }
 
+TEST_CASE("a training that is interrupted while its policy is judged is not lost") {
+  const TemporaryFolder folder;
+  const std::string checkpoint = folder / "p.checkpoint";
+  // It appears when all has been learnt.
+  const Outcome interrupted = Shell(
+      Plumb() + "train " + Robot("pendulum") + " --steps 1600 --held-out 1000000 --output " +
+      folder / "p" + " & until [ -e " + checkpoint + " ]; do sleep 0.01; done; kill $!; wait $!");
+  INFO(interrupted.text);
+  CHECK(interrupted.status == 130);
+  const Outcome again = Shell(Train(folder, "p", "--steps 1600"));
+  CHECK(again.status == 0);
+  CHECK(again.text.find("goes on from " + checkpoint + ": update 1,") != std::string::npos);
+  REQUIRE(Shell(Train(folder, "straight", "--steps 1600")).status == 0);
+  CHECK(Read(folder / "p") == Read(folder / "straight"));
+  CHECK(Read(checkpoint) == Read(folder / "straight.checkpoint"));
+}
+
 TEST_CASE("a training that has not ended is not lost to another one") {
   const TemporaryFolder folder;
   REQUIRE(Shell("exec " + Train(folder, "half", "--steps 1e8"), " KL ").status == 130);
@@ -197,8 +214,7 @@ TEST_CASE("ranks give the same bits as one process, file by file") {
     WARN("openmpi-bin is not installed: ranks are not tested");
     return;
   }
-  const std::string mpirun =
-      "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun --oversubscribe -n 3 ";
+  const std::string mpirun = Mpirun(3);
   const Outcome begun = Shell(mpirun + Train(folder, "three", "--steps 6000 --threads 1"));
   INFO(begun.text);
   REQUIRE(begun.status == 0);

@@ -69,6 +69,22 @@ TEST_CASE(
   CHECK(Deviance(tuned, fresh) < Deviance(shipped, fresh) - 0.1);
 }
 
+TEST_CASE("what does not look whether it is to stop ends at once, and leaves nothing behind") {
+  const TemporaryFolder folder;
+  const std::string log = WriteLog(folder, Swing(LoadRobot(Robot("pendulum")), 1)),
+                    file = folder / "file";
+  for (const std::string& command :
+       {"estimate tune " + Robot("pendulum") + " --log " + log, "export " + log + " --mcap " + file,
+        "export " + log + " --csv " + file,
+        "export-model " + Robot("pendulum") + " --mjcf " + file}) {
+    const Outcome outcome = ShellAskedToEnd(Plumb() + command);
+    INFO(command << ": " << outcome.text);
+    CHECK(outcome.status == 130);
+    CHECK(outcome.text.empty());
+    CHECK_FALSE(fs::exists(file));
+  }
+}
+
 TEST_CASE("plumb estimate tune says what a log lacks") {
   const TemporaryFolder folder;
   const std::vector<SimulatedReadings::Sample> samples =

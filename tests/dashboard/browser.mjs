@@ -4,9 +4,12 @@ import assert from "node:assert/strict";
 import { existsSync } from "node:fs";
 import { createRequire } from "node:module";
 import { connect } from "node:net";
+import { resolve } from "node:path";
+import { fileURLToPath } from "node:url";
 
 const web = new URL("../../dashboard/web/", import.meta.url);
-export const build = process.env.PLUMBLINE_BUILD ?? new URL("../../build", import.meta.url).pathname;
+export const source = process.env.PLUMBLINE_SOURCE ?? fileURLToPath(new URL("../..", import.meta.url));
+export const build = resolve(source, process.env.PLUMBLINE_BUILD ?? "build");
 export const pageFolder = `${build}/dashboard/page`;
 const CHROMIUM = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"].find(existsSync);
 
@@ -69,14 +72,14 @@ export function ages(texts) {
   });
 }
 
-/** Of a browser that asks for everything, ten times over, and reads nothing: its socket, when it has asked. */
+/** Of a browser that asks for everything, more than there is, and reads nothing: its socket, when it has asked. */
 export function stall(address) {
   const { hostname, port } = new URL(address);
   const socket = connect(Number(port), hostname);
   socket.write(`GET / HTTP/1.1\r\nHost: ${hostname}:${port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Protocol: foxglove.websocket.v1\r\n\r\n`);
   return new Promise((resolve) => socket.once("data", () => {
     socket.pause();
-    const text = Buffer.from(JSON.stringify({ op: "subscribe", subscriptions: Array.from({ length: 400 }, (_, id) => ({ id, channelId: 1 + (id % 40) })) }));
+    const text = Buffer.from(JSON.stringify({ op: "subscribe", subscriptions: Array.from({ length: 40 }, (_, id) => ({ id, channelId: 1 + id })) }));
     const head = Buffer.from([0x81, 0xfe, text.length >> 8, text.length & 255, 0, 0, 0, 0]); // the mask is zero
     socket.write(Buffer.concat([head, text]));
     resolve(socket);

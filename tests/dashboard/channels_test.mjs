@@ -3,10 +3,9 @@ import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
 import { createInterface } from "node:readline";
 import { test } from "node:test";
-import { build, clean, launch, look, numbers, PATIENCE } from "./browser.mjs";
+import { fileURLToPath } from "node:url";
+import { build, clean, launch, look, numbers, PATIENCE, source } from "./browser.mjs";
 import { startGateway, stop } from "./gateway.mjs";
-
-const source = process.env.PLUMBLINE_SOURCE ?? new URL("../..", import.meta.url).pathname;
 
 /** The least and the most that `of` makes of the times that lie in the last two seconds before `end`, by how they are counted: in parts of half a second. */
 function range(times, end, of) {
@@ -24,7 +23,7 @@ function deviation(times) {
 }
 
 test("what is said on a channel is counted, and how regularly, and what does not decode", { timeout: 2 * PATIENCE }, async () => {
-  const sender = spawn("/usr/bin/python3", [new URL("steady_sender.py", import.meta.url).pathname, `${build}/lcmtypes/python`], { stdio: ["pipe", "pipe", "inherit"] });
+  const sender = spawn("/usr/bin/python3", [fileURLToPath(new URL("steady_sender.py", import.meta.url)), `${build}/lcmtypes/python`], { stdio: ["pipe", "pipe", "inherit"] });
   const said = [];
   const url = await new Promise((resolve) => createInterface({ input: sender.stdout }).on("line", (line) => (line.startsWith("udpm") ? resolve(line) : said.push(JSON.parse(line)))));
   const [gateway, address] = await startGateway(`${source}/robots/pendulum`, "127.0.0.1:0", url);

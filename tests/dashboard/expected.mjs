@@ -1,6 +1,7 @@
 // What the page must show of a run: its log, decoded by lcm-gen's Python types, and each panel's numbers compared with that.
 import assert from "node:assert/strict";
 import { execFile } from "node:child_process";
+import { fileURLToPath } from "node:url";
 import { promisify } from "node:util";
 import { build, numbers, value } from "./browser.mjs";
 
@@ -10,7 +11,7 @@ const EPISODE = 200; // steps: robots/pendulum/robot.toml
 
 /** The messages of a log in the order in which they were received: [{received, channel, message}]. */
 export async function read(log) {
-  const script = new URL("log_json.py", import.meta.url).pathname;
+  const script = fileURLToPath(new URL("log_json.py", import.meta.url));
   const { stdout } = await promisify(execFile)("/usr/bin/python3", [script, `${build}/lcmtypes/python`, log], { maxBuffer: 1e9 });
   return stdout.trim().split("\n").map((line) => JSON.parse(line));
 }

@@ -51,6 +51,24 @@ TEST_CASE("whoever comes while time stands still sees where the robot is") {
   CHECK(stand.looker.heard[1].json["entities"][1]["id"] == "robot");
 }
 
+TEST_CASE("what is no longer kept is not kept for who was slow to fetch it either") {
+  Stand stand;
+  const auto say = [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      estimator_status_t estimator{};
+      estimator.reason = std::to_string(i);
+      stand.Hear("ESTIMATOR_STATUS", estimator);
+    }
+  };
+  say(0, History::kMaxMessages);
+  stand.Listen("ESTIMATOR_STATUS");
+  say(History::kMaxMessages, 2 * History::kMaxMessages - 1);
+  stand.looker.Take();
+  REQUIRE(stand.looker.heard.size() == History::kMaxMessages);
+  CHECK(stand.looker.heard[0].json["reason"] == std::to_string(History::kMaxMessages - 1));
+  CHECK(stand.looker.heard[1].json["reason"] == std::to_string(History::kMaxMessages));
+}
+
 TEST_CASE("a run that begins anew is a page that begins anew") {
   Stand stand;
   for (const int iteration : {1, 2, 3, 1}) stand.Hear("TRAINING_STATUS", Training(iteration, 1));

@@ -111,7 +111,7 @@ TEST_CASE("a channel that no document knows is offered when it is heard") {
 
 TEST_CASE("times that are none, and names that are ours, do no harm") {
   Stand stand;
-  for (const char* topic : {"PLUMB_SCENE", "PLUMB_PREDICTION", "PLUMB_GATEWAY"})
+  for (const char* topic : {"PLUMB_SCENE", "PLUMB_FRAME", "PLUMB_PREDICTION", "PLUMB_GATEWAY"})
     stand.Listen(topic);
   const int64_t last = std::numeric_limits<int64_t>::max();
   for (const int64_t utime : {last, -last - 1, kUtime, last, int64_t{0}}) {
@@ -130,6 +130,8 @@ TEST_CASE("times that are none, and names that are ours, do no harm") {
   CHECK(std::ranges::count_if(stand.looker.heard, [](const Looker::Heard& heard) {
           return heard.json.contains("speed") && heard.json["speed"].is_number();
         }) == 5);
+  // After the time that such a state says that it is, none would be told any more.
+  CHECK(*std::ranges::max_element(stand.looker.times) <= stand.moment.utime);
   const size_t topics = stand.looker.topics.size();
   stand.Hear("PLUMB_SCENE", State(1));
   stand.looker.Take();

@@ -101,14 +101,16 @@ TEST_CASE("what a client says wrongly is answered, and changes nothing") {
 
 TEST_CASE("one wrong wish of many is named, and the others are granted") {
   Stand stand;
-  const auto topic = stand.looker.topics.at("ROBOT_STATE")["id"];
+  const auto topic = stand.looker.topics.at("ROBOT_STATE")["id"],
+             other = stand.looker.topics.at("TRAINING_STATUS")["id"];
   const nlohmann::json wishes = {{{"id", 1}, {"channelId", 0}},
                                  {{"id", 2}, {"channelId", topic}},
-                                 {{"id", 2}, {"channelId", topic}},
-                                 {{"id", 3}, {"channelId", topic}}};
+                                 {{"id", 2}, {"channelId", other}},
+                                 {{"id", 3}, {"channelId", other}}};
   const auto said = [&] {
     stand.looker.heard.clear();
     stand.Hear("ROBOT_STATE", State(1));
+    stand.Hear("TRAINING_STATUS", Training(1, 1));
     stand.looker.Take();
     std::vector<uint32_t> subscriptions;
     for (const auto& heard : stand.looker.heard) subscriptions.push_back(heard.subscription);
@@ -123,6 +125,25 @@ TEST_CASE("one wrong wish of many is named, and the others are granted") {
   stand.looker.Take();
   CHECK(stand.looker.texts.back()["op"] == "status");
   CHECK(said() == std::vector<uint32_t>{3});
+}
+
+TEST_CASE("a viewer has a topic once at a time: what is kept waits for him once") {
+  Stand stand;
+  for (int update = 0; update < 3; ++update) stand.Hear("TRAINING_STATUS", Training(1, update));
+  const auto subscribe = [&](uint32_t id) {
+    const auto topic = stand.looker.topics.at("TRAINING_STATUS")["id"];
+    stand.gateway.OnText(
+        stand.looker.viewer,
+        json{{"op", "subscribe"}, {"subscriptions", {{{"id", id}, {"channelId", topic}}}}}.dump());
+    stand.looker.Take();
+  };
+  for (uint32_t id = 1; id < 400; ++id) subscribe(id);
+  CHECK(stand.looker.heard.size() == 3);
+  CHECK_THAT(stand.looker.texts.back()["message"].get<std::string>(),
+             Catch::EndsWith("is subscribed already"));
+  stand.gateway.OnText(stand.looker.viewer, R"({"op":"unsubscribe","subscriptionIds":[1]})");
+  subscribe(2);
+  CHECK(stand.looker.heard.size() == 6);
 }
 
 }  // namespace

@@ -19,18 +19,17 @@ struct Looker {
   };
   /// Texts of the protocol, messages of topics, answers of services, in order of arrival.
   void Take() {
-    while (!viewer.outbox.empty()) {
-      const Outbox::Item item = viewer.outbox.Pop();
-      if (!item.binary) {
-        texts.push_back(nlohmann::json::parse(*item.payload));
+    while (const auto item = viewer.outbox.Pop()) {
+      if (!item->binary) {
+        texts.push_back(nlohmann::json::parse(*item->payload));
         for (const auto& topic : texts.back().value("channels", nlohmann::json::array()))
           topics[topic["topic"]] = topic;
-      } else if (item.tells_time()) {
-        times.push_back(*item.utime);
-      } else if (!item.is_message()) {
-        answers.push_back(nlohmann::json::parse(item.payload->substr(17)));
+      } else if (item->tells_time()) {
+        times.push_back(*item->utime);
+      } else if (!item->is_message()) {
+        answers.push_back(nlohmann::json::parse(item->payload->substr(17)));
       } else {
-        heard.push_back({item.subscription, *item.utime, nlohmann::json::parse(*item.payload)});
+        heard.push_back({item->subscription, *item->utime, nlohmann::json::parse(*item->payload)});
       }
     }
   }

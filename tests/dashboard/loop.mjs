@@ -1,9 +1,7 @@
 // A closed loop with its page: `plumb launch --dashboard` and where it listens.
 import { spawn } from "node:child_process";
 import { createInterface } from "node:readline";
-import { build } from "./browser.mjs";
-
-const source = process.env.PLUMBLINE_SOURCE ?? new URL("../..", import.meta.url).pathname;
+import { build, source } from "./browser.mjs";
 
 /** @param port of LCM, between 20000 and 40000; the bus has the port 20000 above it. `ended` is kept when all processes are gone. */
 export async function startLoop(robot, options, folder, port) {

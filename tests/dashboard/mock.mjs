@@ -137,7 +137,9 @@ export async function serve(folder, port = 0, story = {}) {
         [state, text] = answer[service];
         const head = Buffer.alloc(13), encoding = Buffer.from("json");
         head.writeUInt8(3, 0), head.writeUInt32LE(data.readUInt32LE(1), 1), head.writeUInt32LE(call, 5), head.writeUInt32LE(4, 9);
-        client.send(Buffer.concat([head, encoding, Buffer.from(JSON.stringify({ ok: true, text }))]));
+        const reply = () => client.send(Buffer.concat([head, encoding, Buffer.from(JSON.stringify({ ok: true, text }))]));
+        if (service === story.late) story.answerLate = reply;
+        else reply();
       }
     });
   });

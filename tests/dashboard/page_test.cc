@@ -22,7 +22,7 @@ TEST_CASE("the page's files are served, and nothing else on the disk") {
   write(folder / "notes.key", "secret");
   write(temporary.path() / "outside.js", "secret");
   fs::create_symlink(temporary.path() / "outside.js", folder / "link.js");
-  const Page page(folder);
+  const PageFolder page(folder);
   REQUIRE(page.Find("/"));
   CHECK(page.Find("/")->content == "<!doctype html>");
   CHECK(page.Find("/")->type == "text/html; charset=utf-8");
@@ -45,7 +45,7 @@ TEST_CASE("the page's files are served, and nothing else on the disk") {
 
 TEST_CASE("without a built page it says how to build it") {
   const TemporaryFolder temporary;
-  const Page page(temporary.path() / "nowhere");
+  const PageFolder page(temporary.path() / "nowhere");
   REQUIRE(page.Find("/"));
   CHECK(page.Find("/")->content.find("scripts/setup --page") != std::string::npos);
   CHECK_FALSE(page.Find("/page.js"));

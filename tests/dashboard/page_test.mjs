@@ -112,6 +112,31 @@ test("a run that may only be looked at says why", visit({ robot: { may_control: 
   assert.deepEqual(mock.asked, ["emergency_stop"]);
 }));
 
+test("whoever may not arm may disarm", visit({ robot: { may_control: false, why_not: "without the token" }, driver: { state: 3 } }, {}, async ({ page, mock }) => {
+  await page.getByRole("button", { name: "Disarm" }).click();
+  await page.locator(".outcome .done").waitFor();
+  assert.ok(await page.getByRole("button", { name: "Arm…" }).isDisabled());
+  assert.deepEqual(mock.asked, ["disarm"]);
+}));
+
+test("in virtual time nobody may disarm", visit({ robot: { may_control: false }, driver: { state: 3 }, clock: "virtual" }, {}, async ({ page }) => {
+  await page.locator("[data-driver=armed]").waitFor();
+  await page.locator("[data-clock=virtual]").waitFor();
+  assert.ok(await page.getByRole("button", { name: "Disarm" }).isDisabled());
+}));
+
+test("the late answer to an earlier wish does not hide that to a stop", visit({ late: "arm" }, {}, async ({ page, story }) => {
+  await page.getByRole("button", { name: "Arm…" }).click();
+  await page.getByRole("checkbox").check();
+  await page.getByRole("dialog").getByRole("button", { name: "Arm", exact: true }).click();
+  await page.locator(".outcome .asked").waitFor();
+  await page.keyboard.press("Escape");
+  await page.locator(".outcome .done").waitFor();
+  story.answerLate();
+  await page.locator("#events").getByText(/^Arm: /).waitFor();
+  assert.match(await page.locator(".outcome").innerText(), /Emergency stop.*stopped by request/);
+}));
+
 test("a page of another robot than the run's says so", visit({ robot: { name: "hopper" } }, {}, async ({ page }) => {
   await page.getByRole("alert").filter({ hasText: "The driver that is heard is of pendulum, and this page of hopper" }).waitFor();
 }));

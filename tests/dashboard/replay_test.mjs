@@ -6,12 +6,11 @@ import { copyFileSync, mkdirSync, mkdtempSync, rmSync, writeFileSync } from "nod
 import { tmpdir } from "node:os";
 import { after, before, test } from "node:test";
 import { promisify } from "node:util";
-import { ages, build, clean, launch, look, PATIENCE, stall, value } from "./browser.mjs";
+import { ages, build, clean, launch, look, PATIENCE, source, stall, value } from "./browser.mjs";
 import { compare, everything, read } from "./expected.mjs";
 import { startGateway, stop } from "./gateway.mjs";
 
 const run = promisify(execFile);
-const source = process.env.PLUMBLINE_SOURCE ?? new URL("../..", import.meta.url).pathname;
 // Of which the model knows too little: there is an alarm, and what was learnt of the rest.
 const robot = `${source}/robots/pendulum/worn.toml`;
 const url = `udpm://239.255.76.67:${20000 + (process.pid % 20000)}?ttl=0&recv_buf_size=2097152`;

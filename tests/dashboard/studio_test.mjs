@@ -7,16 +7,16 @@ import { createServer } from "node:http";
 import { tmpdir } from "node:os";
 import { extname, normalize } from "node:path";
 import { after, before, test } from "node:test";
+import { fileURLToPath } from "node:url";
 import { promisify } from "node:util";
-import { build, launch, PATIENCE } from "./browser.mjs";
+import { build, launch, PATIENCE, source } from "./browser.mjs";
 import { startLoop } from "./loop.mjs";
 
-const studio = new URL("studio/", import.meta.url).pathname;
+const studio = fileURLToPath(new URL("studio/", import.meta.url));
 if (!existsSync(`${studio}node_modules/@foxglove/studio-base`)) {
   console.log("skipped: Foxglove Studio is not installed (scripts/setup --browser)");
   process.exit(77);
 }
-const source = process.env.PLUMBLINE_SOURCE ?? new URL("../..", import.meta.url).pathname;
 const [pictures] = process.argv.slice(2);
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".wasm": "application/wasm", ".png": "image/png", ".ttf": "font/ttf" };
 const folder = mkdtempSync(`${tmpdir()}/studio-test.`);

@@ -57,7 +57,8 @@ TEST_CASE("an oracle does not go on from another robot's or seed's checkpoint") 
     TrainOracle(robot, SimulateRobot(robot), seed, 1, folder / "oracle", identity, After(20));
   };
   CHECK_THROWS_AS(train(3, 5), Stop);
-  CHECK_THROWS_WITH(train(4, 5), Catch::Contains(folder / "oracle: of another robot or seed"));
+  CHECK_THROWS_WITH(train(4, 5),
+                    Catch::Contains(folder / "oracle: of another robot, seed or version"));
   CHECK_THROWS_AS(train(3, 6), CheckpointError);
   CHECK_THROWS_AS(train(3, 5), Stop);
 }

@@ -1,6 +1,7 @@
 #include "experiments/results.h"
 
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <fstream>
 #include <string>
 
@@ -32,6 +33,19 @@ TEST_CASE("a table is read as it was written, nan included") {
   CHECK(std::isnan(results.Of("hop,step")[1][1]));
   CHECK(results.Of("hop,prior") == Results::Rows{{1, 1e-12}});
   CHECK(!results.Has("hop,oracle"));
+}
+
+TEST_CASE("who makes a result goes on with the numbers that who reads the table has") {
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "table.csv";
+  Results::Rows made;
+  {
+    Results results = Open(file);
+    results.Add("hop,step", {{1. / 3, 2e9 / 7}, {-M_PI * 1e-9, 1e300 / 3}, {INFINITY, 0.1}});
+    made = results.Of("hop,step");
+  }
+  CHECK(made[0][0] == 0.33333333);
+  CHECK(Open(file).Of("hop,step") == made);
 }
 
 TEST_CASE("a table of something else is not touched") {

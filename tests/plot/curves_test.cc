@@ -1,7 +1,12 @@
 #include "plot/curves.h"
 
+#include <fmt/format.h>
+
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <regex>
+#include <set>
+#include <string>
 
 namespace plumb {
 namespace {
@@ -39,6 +44,24 @@ TEST_CASE("a drawing has a line for each curve, in its colour, and leaves out wh
   CHECK(svg.find("line c1") != std::string::npos);
   CHECK(svg.find("nan") == std::string::npos);
   CHECK(svg.find("inf") == std::string::npos);
+}
+
+TEST_CASE("however many curves there are, each has a colour, and the first twenty differ") {
+  const std::vector<Curve> curves(24, {"one of many", {1, 2}, {1, 2}, {0, 1}, {2, 3}});
+  const std::string svg = DrawCurves("title", {{"all", "x", "y", false, curves}});
+  const std::regex drawn(R"re(class="((?:line|band) (c\d+)( again)?)")re");
+  std::set<std::string> looks;
+  int count = 0;
+  for (std::sregex_iterator i(svg.begin(), svg.end(), drawn); i != std::sregex_iterator(); ++i) {
+    const std::string kind = (*i)[1].str().substr(0, 4);
+    CAPTURE(i->str());
+    CHECK(svg.find(fmt::format(".{}.{} {{", kind, (*i)[2].str())) != std::string::npos);
+    looks.insert((*i)[1]);
+    ++count;
+  }
+  CHECK(count == 24 * 3);  // in the legend, too
+  CHECK(looks.size() == 2 * 20);
+  CHECK(svg.find(".line.again { stroke-dasharray") != std::string::npos);
 }
 
 }  // namespace

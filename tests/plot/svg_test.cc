@@ -22,6 +22,16 @@ TEST_CASE("ticks are round, few, and within their axis") {
   CHECK(std::isfinite(Axis(NAN, INFINITY, 0, 50).Pixel(0.5)));
 }
 
+TEST_CASE("a drawing for a file of its own is the page's with a style behind its title") {
+  Svg svg(40, 30, "title");
+  svg.Line(0, 0, 1, 1, "red");
+  std::string alone = svg.PrintAlone(".red { stroke: #ff0000; }\n");
+  const size_t begin = alone.find("<style>"), end = alone.find("</style>\n") + 9;
+  CHECK(alone.substr(begin - 9, 9) == "</title>\n");
+  CHECK(alone.substr(begin, end - begin).find(".red { stroke") != std::string::npos);
+  CHECK(alone.erase(begin, end - begin) == svg.Print());
+}
+
 TEST_CASE("an ellipse is where the Mahalanobis distance is its sigma") {
   Eigen::Matrix2d covariance;
   covariance << 2, -0.7, -0.7, 0.5;

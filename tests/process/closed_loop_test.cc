@@ -36,6 +36,7 @@ TEST_CASE("an excitation is played on the robot and calibrated with, without any
                hidden = combination.at("hidden");
   CHECK(std::abs(mean / hidden - 1) < 0.02);
   CHECK(sd < 0.05 * mean);
+  CHECK(summary.at("policy").is_null());
 
   std::ofstream(table) << "t,u/pivot\n0,3\n";  // more than the motor has
   Child refused = Launch(stage, {"--efforts", table}, "refused");

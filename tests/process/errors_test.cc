@@ -102,6 +102,16 @@ TEST_CASE("wrong flags are usage errors") {
     arguments[0] = Stage::Binary(arguments[0]);
     FailureOf(stage.folder, arguments);
   }
+  for (const auto& [in_vain, words] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{"--can-log", stage.folder / "can.log", "--real-time"}, "--real-time excludes"},
+           {{"--can-log", stage.folder / "can.log", "--real"}, "--real excludes"},
+           {{"--realtime-priority", "50"}, "needs --real-time or --real"}}) {
+    std::vector<std::string> arguments{Stage::Binary("plumb"), "launch", stage.robot_folder,
+                                       "--output", stage.folder / "run"};
+    arguments.insert(arguments.end(), in_vain.begin(), in_vain.end());
+    CHECK_THAT(FailureOf(stage.folder, arguments), Contains(words));
+    CHECK_FALSE(fs::exists(stage.folder / "run"));
+  }
   const std::string output =
       FailureOf(stage.folder, {Stage::Binary("plumb"), "launch", stage.robot_folder, "--lcm-url",
                                stage.lcm_url, "--clock", "fast"});

@@ -35,11 +35,11 @@ class CalibrationTest(Test):
     def test_the_same_bytes_as_the_command_from_csv_and_from_arrays(self):
         self.plumb("calibrate", ROBOTS / "pendulum", "--csv", "motion.csv", "--output", "command.json", *FLAGS)
         expected = without_run(self.folder / "command.json")
-        motion = plumbline.read_csv(str(self.folder / "motion.csv"), self.pendulum)
+        motion = plumbline.read_csv(self.folder / "motion.csv", self.pendulum)
         arrays = plumbline.motion(self.pendulum, **self.arrays(), name="motion.csv")
         for threads, given in ((1, motion), (2, arrays)):
             found = plumbline.calibrate(self.pendulum, given, threads=threads, **OPTIONS)
-            found.save(str(self.folder / "ours.json"))
+            found.save(self.folder / "ours.json")
             # The command was given the file by its name alone.
             ours = without_run(self.folder / "ours.json").replace(str(self.folder) + "/", "")
             self.assertEqual(ours, expected)
@@ -55,8 +55,8 @@ class CalibrationTest(Test):
         self.plumb("launch", ROBOTS / "pendulum", "--seed", 1, "--iterations", 1, "--bus", "loop:", "--output", "run", "--log",
                    "run.lcmlog")
         self.plumb("calibrate", ROBOTS / "pendulum", "--log", "run.lcmlog", "--output", "command.json", *FLAGS)
-        motion = plumbline.read_lcm(str(self.folder / "run.lcmlog"), self.pendulum)
-        plumbline.calibrate(self.pendulum, [motion], **OPTIONS).save(str(self.folder / "ours.json"))
+        motion = plumbline.read_lcm(self.folder / "run.lcmlog", self.pendulum)
+        plumbline.calibrate(self.pendulum, [motion], **OPTIONS).save(self.folder / "ours.json")
         self.assertEqual(without_run(self.folder / "ours.json").replace(str(self.folder) + "/", ""),
                          without_run(self.folder / "command.json"))
         states = [message for message in plumbline.read_log(self.folder / "run.lcmlog", channels=["ROBOT_STATE"])]
@@ -66,7 +66,7 @@ class CalibrationTest(Test):
     def test_posteriors_in_and_out(self):
         motion = plumbline.motion(self.pendulum, **self.arrays())
         found = plumbline.calibrate(self.pendulum, motion, **OPTIONS)
-        file = str(self.folder / "posterior.json")
+        file = self.folder / "posterior.json"
         found.save(file)
         read, ours = plumbline.load_posterior(file, self.pendulum), found.distribution
         for name in ("weights", "means", "covariances", "mean", "sd"):
@@ -77,7 +77,7 @@ class CalibrationTest(Test):
         numpy.testing.assert_allclose(samples.mean(axis=0), read.mean, atol=5 * numpy.max(read.sd) / 5000**0.5)
         numpy.testing.assert_allclose(samples.std(axis=0), read.sd, rtol=0.1)
         self.refused("is another robot's", plumbline.load_posterior, file, robot("hopper"), error=RuntimeError)
-        self.refused("there is no such file", plumbline.load_posterior, file + "x", self.pendulum, error=RuntimeError)
+        self.refused("there is no such file", plumbline.load_posterior, f"{file}x", self.pendulum, error=RuntimeError)
         simulation = plumbline.Simulation(self.pendulum, 100)
         simulation.set_parameters(read.sample(100, seed=2))
 
@@ -95,6 +95,8 @@ class CalibrationTest(Test):
 
     def test_progress_may_end_it_and_others_run_meanwhile(self):
         motion = plumbline.motion(self.pendulum, **self.arrays())
+        self.others_run_during(plumbline.motion, self.pendulum,
+                               **{name: numpy.concatenate([column] * 100) for name, column in self.arrays().items()})
         told = []
         plumbline.calibrate(self.pendulum, motion, progress=lambda what, share: told.append(share), **OPTIONS)
         self.assertTrue(told and all(0 <= share <= 1 for share in told))
@@ -121,17 +123,17 @@ class CalibrationTest(Test):
         refused("arrays: no transition can be used: its rows are 1 s apart", RuntimeError, t=numpy.arange(400.0))
         refused("arrays: no transition can be used", RuntimeError, **{name: column[:0] for name, column in good.items()})
         motion = plumbline.motion(self.pendulum, **good)
-        for words, named in (("'laplac'", {"method": "laplac"}), ("horizons: is empty", {"horizons": []}),
-                             ("horizons: is 0", {"horizons": [0]}), ("budget: is 1", {"budget": 1}),
-                             ("threads: is -1", {"threads": -1})):
+        for words, named in (("'laplac'", {"method": "laplac"}), ("'square'", {"discrepancy": "square"}),
+                             ("horizons: is empty", {"horizons": []}), ("horizons: is 0", {"horizons": [0]}),
+                             ("budget: is 1", {"budget": 1}), ("threads: is -1", {"threads": -1})):
             self.refused(words, plumbline.calibrate, self.pendulum, motion, **named)
         self.refused("motions: there is nothing", plumbline.calibrate, self.pendulum, [])
         self.refused("motions: has something else", plumbline.calibrate, self.pendulum, ["motion.csv"])
         self.refused("motions: is neither", plumbline.calibrate, self.pendulum, 1)
         self.refused("motion.csv:1: column 'q/pivot' is of no joint of robot 'hopper'", plumbline.read_csv,
-                     str(self.folder / "motion.csv"), robot("hopper"), error=RuntimeError)
+                     self.folder / "motion.csv", robot("hopper"), error=RuntimeError)
         self.refused("motions: arrays is of another robot", plumbline.calibrate, robot("hopper"), motion)
-        self.refused("is no LCM log", plumbline.read_lcm, str(self.folder / "motion.csv"), self.pendulum, error=RuntimeError)
+        self.refused("is no LCM log", plumbline.read_lcm, self.folder / "motion.csv", self.pendulum, error=RuntimeError)
 
 
 if __name__ == "__main__":

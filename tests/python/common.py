@@ -1,8 +1,11 @@
 """What the tests of the module share: the robots, the command, a folder of one's own."""
 import os
 import pathlib
+import signal
 import subprocess
+import sys
 import tempfile
+import threading
 import unittest
 
 import plumbline
@@ -12,7 +15,7 @@ PLUMB = pathlib.Path(os.environ["PLUMBLINE_BUILD"], "bin/plumb")
 
 
 def robot(name="pendulum"):
-    return plumbline.load_robot(str(ROBOTS / name))
+    return plumbline.load_robot(ROBOTS / name)
 
 
 class Test(unittest.TestCase):
@@ -32,3 +35,33 @@ class Test(unittest.TestCase):
         with self.assertRaises(error) as raised:
             call(*arguments, **named)
         self.assertIn(words, str(raised.exception))
+
+    def others_run_during(self, call, *arguments, **named):
+        """Another thread runs before the call is over. Nobody takes the GIL away here: the call has to give it."""
+        said, interval = [], sys.getswitchinterval()
+        thread = threading.Thread(target=lambda: said.append(call(*arguments, **named)))
+        sys.setswitchinterval(1000)
+        try:
+            thread.start()
+            self.assertEqual(said, [])
+        finally:
+            sys.setswitchinterval(interval)
+            thread.join()
+        self.assertEqual(len(said), 1)
+
+    def can_be_interrupted(self, call, *arguments, **named):
+        """A signal's handler is run before the call is over, and what it raises ends the call: at the third signal, as all that
+        come during a call that looks for none are one."""
+        signals = []
+
+        def count(*_):
+            signals.append(1)
+            if len(signals) == 3:
+                raise KeyboardInterrupt
+        self.addCleanup(signal.signal, signal.SIGALRM, signal.signal(signal.SIGALRM, count))
+        signal.setitimer(signal.ITIMER_REAL, 0.1, 0.1)
+        try:
+            with self.assertRaises(KeyboardInterrupt):
+                call(*arguments, **named)
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0)

@@ -1,5 +1,6 @@
 """Docstrings are there and their examples true; the stubs have what the compiled part has."""
 import ast
+import contextlib
 import doctest
 import inspect
 import os
@@ -81,6 +82,18 @@ class DocumentsTest(unittest.TestCase):
         test = doctest.DocTestParser().get_doctest(text, {}, "docs/python.md", None, None)
         self.assertGreater(len(test.examples), 15)
         self.assertEqual(doctest.DocTestRunner().run(test).failed, 0)
+
+    def test_no_robot_is_a_type_error(self):
+        pendulum = plumbline.load_robot(SOURCE / "robots/pendulum")
+        others = {"count": 1, "file": "none", "motions": [], "t": [0], "q": [[0]], "v": [[0]], "u": [[0]]}
+        for name, arguments in compiled().items():
+            if "robot" in (arguments or []):
+                call = getattr(_native, name.removesuffix(".__init__"))
+                named = {argument: others[argument] for argument in arguments if argument in others}
+                with contextlib.suppress(ValueError, RuntimeError):
+                    call(robot=pendulum, **named)  # of a type that it takes, all of them
+                with self.assertRaises(TypeError, msg=name):
+                    call(robot=None, **named)
 
     def test_stubs_have_what_the_module_has(self):
         self.assertEqual(stubs(), compiled())

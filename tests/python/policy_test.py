@@ -20,7 +20,7 @@ class PolicyTest(Test):
 
     def test_the_command_s_bits(self):
         said = self.train()
-        policy = plumbline.load_policy(str(self.folder / "policy.onnx"), self.pendulum)
+        policy = plumbline.load_policy(self.folder / "policy.onnx", self.pendulum)
         # as `plumb sim` plays it
         self.plumb("sim", ROBOTS / "pendulum", "--policy", "policy.onnx", "--episodes", 2, "--seed", 5, "--csv", "sim.csv")
         with open(self.folder / "sim.csv") as stream:
@@ -66,13 +66,18 @@ class PolicyTest(Test):
         self.refused("distribution: is of robot 'hopper'", policy.evaluate, plumbline.prior(robot("hopper")))
         self.refused("policy: is another robot's", plumbline.play, robot("hopper"), policy)
         self.refused("policy, random: exclude each other", plumbline.play, self.pendulum, policy, random=True)
-        self.refused("is for another robot", plumbline.load_policy, str(self.folder / "policy.onnx"), robot("hopper"))
+        self.refused("is for another robot", plumbline.load_policy, self.folder / "policy.onnx", robot("hopper"))
+
+    def test_evaluation_can_be_interrupted(self):
+        self.train()
+        policy = plumbline.load_policy(self.folder / "policy.onnx", self.pendulum)
+        self.can_be_interrupted(policy.evaluate, episodes=100_000, threads=2)
 
     def test_files_that_are_no_policy(self):
         self.refused("none.onnx: there is no such policy", plumbline.load_policy, "none.onnx", self.pendulum)
         (self.folder / "text.onnx").write_text("not a policy")
         self.refused("text.onnx: is neither a trainer's checkpoint nor an ONNX model", plumbline.load_policy,
-                     str(self.folder / "text.onnx"), self.pendulum)
+                     self.folder / "text.onnx", self.pendulum)
 
 
 if __name__ == "__main__":

@@ -35,9 +35,9 @@ class RobotTest(Test):
         self.assertEqual(len(hopper.observations), 11)
 
     def test_errors_are_the_command_s(self):
-        self.refused("robots/none: there is no such robot", plumbline.load_robot, str(ROBOTS / "none"), error=RuntimeError)
+        self.refused("robots/none: there is no such robot", plumbline.load_robot, ROBOTS / "none", error=RuntimeError)
         (self.folder / "robot.toml").write_text("name = 1\n")
-        self.refused("robot.toml:1:", plumbline.load_robot, str(self.folder), error=RuntimeError)
+        self.refused("robot.toml:1:", plumbline.load_robot, self.folder, error=RuntimeError)
 
 
 class PlayTest(Test):
@@ -61,6 +61,9 @@ class PlayTest(Test):
         self.refused("mass/pole", plumbline.play, pendulum, parameters=[9.81, -1, 1])
         self.refused("episodes: is -1", plumbline.play, pendulum, episodes=-1)
         self.refused("threads: is -1", plumbline.play, pendulum, threads=-1)
+
+    def test_can_be_interrupted(self):
+        self.can_be_interrupted(plumbline.play, robot(), episodes=20_000, threads=2)
 
 
 class SimulationTest(Test):
@@ -150,6 +153,7 @@ class SimulationTest(Test):
 
     def test_other_threads_run_meanwhile_and_may_not_interfere(self):
         hopper = robot("hopper/gym.toml")
+        self.others_run_during(plumbline.Simulation, hopper, 4000)
         simulation = plumbline.Simulation(hopper, 20_000, threads=1)
         actions = numpy.zeros((20_000, 3), numpy.float32)
         at_work, counted, refused = threading.Event(), 0, 0

@@ -4,6 +4,7 @@ import unittest
 import numpy
 import plumbline
 from common import Test, robot
+from plumbline._native import TaskBatch
 
 
 def played(env, steps, seed=1):
@@ -80,6 +81,9 @@ class VectorEnvTest(Test):
             for ours, same in zip(played(env, 60), one, strict=True):
                 numpy.testing.assert_array_equal(ours, same)
         self.assertFalse(numpy.array_equal(played(plumbline.VectorEnv(hopper, 33), 1, seed=2)[0], one[0]))
+
+    def test_other_threads_run_while_it_is_made(self):
+        self.others_run_during(TaskBatch, robot("hopper/gym.toml"), 8000)
 
     def test_copies_unless_told_otherwise(self):
         env = plumbline.VectorEnv(robot(), 3)

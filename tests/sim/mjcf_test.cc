@@ -1,6 +1,7 @@
 // What Mjcf writes, as MuJoCo reads it: the same robot, under the same names.
 #include "sim/mjcf.h"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <fstream>
 #include <memory>
@@ -164,6 +165,16 @@ TEST_CASE("mjcf: a model that is given other parameters is the model of these pa
   CHECK_THROWS_WITH(SetParameter(any.model.get(), "length/pole", 1, 1),
                     Catch::Contains("length/pole"));
   CHECK_THROWS_WITH(SetParameter(any.model.get(), "mass/leg", 1, 1), Catch::Contains("mass/leg"));
+}
+
+TEST_CASE("mjcf: no contact is lost: what touches has to be a body") {
+  RobotDescription robot = LoadRobot(SourceFile("robots/hopper/gym.toml"));
+  const auto slide = std::find_if(robot.links.begin() + 1, robot.links.end(),
+                                  [](const LinkDescription& link) { return link.mass == 0; });
+  REQUIRE(slide != robot.links.end());
+  CHECK_NOTHROW(Mjcf(robot));
+  slide->collisions.push_back({});
+  CHECK_THROWS_WITH(Mjcf(robot), Catch::Contains(slide->name));
 }
 
 TEST_CASE("mjcf: names are the robot's, whatever characters they have") {

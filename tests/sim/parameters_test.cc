@@ -96,6 +96,10 @@ TEST_CASE("a parameter with a wildcard is one number for all that it covers but 
                     Catch::Contains("'mass/*_hip' and 'mass/front_*' both give"));
   CHECK_THROWS_WITH(Model(WithParameters(robot, {"*/front_left_hip"})),
                     Catch::Contains("one number cannot be both"));
+  CHECK_THROWS_WITH(Model(WithParameters(robot, {"contact/*"})),
+                    Catch::Contains("one number cannot be both"));
+  // of the base's, which has no effect, nobody speaks
+  CHECK_NOTHROW(Model(WithParameters(robot, {"mass/*"})));
   CHECK_THROWS_WITH(Model(WithParameters(robot, {"mass/*_arm"})),
                     Catch::Contains("has no parameter 'mass/*_arm'"));
 }

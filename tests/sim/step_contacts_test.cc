@@ -116,6 +116,29 @@ TEST_CASE("a contact touches at the beginning of a step or at its end") {
   CHECK(touching(0.02, 0) == 0);
 }
 
+TEST_CASE("a point that the robot cannot move is none of its contacts") {
+  // Below an upright axis a ball turns on the spot.
+  RobotDescription turning = TreeOverGround();
+  turning.links = {turning.links[0], turning.links[4]};
+  turning.joints = {turning.joints[3]};
+  JointDescription& joint = turning.joints[0];
+  joint.child = 1, joint.axis = Eigen::Vector3d::UnitZ();
+  joint.origin.setZero(), joint.rotation.setIdentity();
+  Shape ball;
+  ball.size = {0.05, 0, 0}, ball.position = {0, 0, 0.05};
+  turning.links[1].collisions = {ball};
+  Simulator simulator(turning);
+  StepContacts contacts(Model(turning), 0.01);
+  Make(simulator, &contacts, Eigen::VectorXd::Zero(1), Eigen::VectorXd::Ones(1));
+  CHECK(contacts.touching().empty());
+  turning.links[1].collisions[0].position.x() = 0.1;  // moves along a circle
+  Simulator wheeling(turning);
+  StepContacts other(Model(turning), 0.01);
+  Make(wheeling, &other, Eigen::VectorXd::Zero(1), Eigen::VectorXd::Ones(1));
+  REQUIRE(other.touching().size() == 1);
+  CHECK(other.touching()[0]->response.allFinite());
+}
+
 TEST_CASE("a joint at a stop is a contact, away from whichever stop is nearer") {
   const RobotDescription robot = Gym();
   Simulator simulator(robot);

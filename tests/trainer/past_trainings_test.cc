@@ -117,6 +117,14 @@ TEST_CASE("what was trained of something else is trained again") {
     other.Begin(0);
     CHECK(other.Train() == 6);
   }
+  SECTION("a distribution that was replaced while its trainings were repeated") {
+    Life other(folder);
+    other.Begin(0);
+    CHECK(other.Train(2) == 0);
+    other.past.Forget();
+    CHECK_FALSE(other.past.repeating());
+    CHECK(other.Train() == 6);
+  }
 }
 
 }  // namespace

@@ -40,9 +40,12 @@ TEST_CASE("Of several starts none learns from another, and the best policy goes 
   // The first start's policies count, too.
   TrainerState worse = trainer.state();
   worse.best->mean_return = 0, worse.best->updates = 3, worse.best->policy = single.policy();
+  worse.best->observations = single.state().observations;
   resumed.Restore(worse);
   CHECK(resumed.ReturnToBest(GymParameters) == 3);
   CHECK(resumed.policy().parameters == single.policy().parameters);
+  // Its normaliser follows what it has seen itself, not what the second start has.
+  CHECK(resumed.state().observations.mean == single.state().observations.mean);
 
   // After them it goes on.
   update(trainer);
@@ -89,6 +92,7 @@ TEST_CASE("Training returns to the best policy that was judged") {
   };
   TrainingSettings settings = SmallSettings();
   settings.updates = 32;  // a judgement before every second update
+  settings.normalise_observations = true;
   const auto new_trainer = [&] {
     return Trainer(
         settings, [] { return std::make_unique<Told>(); }, Eigen::VectorXd::Ones(1), 3, 1);
@@ -121,6 +125,8 @@ TEST_CASE("Training returns to the best policy that was judged") {
     CHECK(trainer.policy().parameters == best.policy.parameters);
     CHECK(trainer.state().critic.parameters == best.critic.parameters);
     CHECK(trainer.state().critic.adam_steps == best.critic.adam_steps);
+    CHECK(trainer.state().observations.count == best.observations.count);
+    CHECK(trainer.state().observations.squares == best.observations.squares);
     CHECK(trainer.updates() == 5);
     CHECK_FALSE(trainer.state().best);
     CHECK(trainer.JudgementDue());
@@ -134,6 +140,7 @@ TEST_CASE("Training returns to the best policy that was judged") {
     CHECK(other.ReturnToBest(GymParameters) == 2);
     CHECK(other.policy().parameters == best.policy.parameters);
     CHECK(other.state().critic.second_moment == best.critic.second_moment);
+    CHECK(other.state().observations.mean == best.observations.mean);
   }
   SECTION("which is the latest, if that is better") {
     reward = 2.1;

@@ -2,11 +2,14 @@
 #include "umbridge/remote_calibration.h"
 
 #include <unistd.h>
+#include <boost/asio/read_until.hpp>
+#include <boost/asio/write.hpp>
 #include <catch2/catch.hpp>
 #include <cstdlib>
 #include <thread>
 
 #include "http/client.h"
+#include "http/http.h"
 #include "umbridge/server.h"
 
 namespace plumb {
@@ -20,10 +23,9 @@ constexpr double kOutcomeNoise = 0.01;
 /// A server in this process, on a port of its own.
 class Serving {
  public:
-  explicit Serving(std::vector<ServedModel> models)
-      : server_({"127.0.0.1", 0}, {}, std::move(models)) {
+  explicit Serving(std::vector<ServedModel> models, const std::string& address = "127.0.0.1")
+      : server_({address, 0}, {}, std::move(models)) {
     REQUIRE(pipe(pipe_) == 0);
-    url_ = "http://127.0.0.1:" + std::to_string(server_.port());
     thread_ = std::thread([this] { server_.Run(pipe_[0], [] { return true; }); });
   }
   ~Serving() {
@@ -31,12 +33,37 @@ class Serving {
     thread_.join();
     close(pipe_[1]);
   }
-  const std::string& url() const { return url_; }
+  std::string url() const { return server_.url(); }
 
  private:
   UmbridgeServer server_;
   int pipe_[2];
-  std::string url_;
+  std::thread thread_;
+};
+
+/// Answers one request, whatever it is.
+class Saying {
+ public:
+  explicit Saying(const std::string& answer)
+      : acceptor_(context_, {asio::ip::address_v4::loopback(), 0}), thread_([this, answer] {
+          tcp::socket socket = acceptor_.accept();
+          asio::read_until(socket, asio::dynamic_buffer(heard_), "\r\n\r\n");
+          asio::write(socket, asio::buffer(answer));
+        }) {}
+  ~Saying() {
+    if (thread_.joinable()) thread_.join();
+  }
+  std::string url() const { return "http://localhost:" + std::to_string(port()); }
+  uint16_t port() const { return acceptor_.local_endpoint().port(); }
+  const std::string& Heard() {
+    thread_.join();
+    return heard_;
+  }
+
+ private:
+  asio::io_context context_;
+  tcp::acceptor acceptor_;
+  std::string heard_;
   std::thread thread_;
 };
 
@@ -151,12 +178,50 @@ TEST_CASE("a model that is not what it should be is refused in a line") {
         model.Evaluate(Eigen::MatrixXd::Ones(2, 1)),
         Catch::StartsWith(mad.url() + ": /Evaluate answers") && Contains("which no output is"));
   }
-  for (const char* url : {"https://127.0.0.1:1", "127.0.0.1:1", "http://", "http://a:b",
-                          "http://:1", "http://a/b", "http://a b:1"})
+  for (const char* url :
+       {"https://127.0.0.1:1", "127.0.0.1:1", "http://", "http://a:b", "http://:1", "http://a/b",
+        "http://a b:1", "http://127.0.0.1:65537", "http://::1:1", "http://[::1]x:1"})
     CHECK_THROWS_WITH(RemoteModel(url, "next_states", 2, size), Contains("http://HOST:PORT"));
   // Port 1 of this machine: nobody is there.
   CHECK_THROWS_WITH(RemoteModel("http://127.0.0.1:1", "next_states", 2, size),
                     Contains("http://127.0.0.1:1/InputSizes: Connection refused"));
+}
+
+TEST_CASE("a request names the server as the user does") {
+  Saying server("HTTP/1.1 200 OK\r\n\r\n{}");
+  CHECK(PostHttp(server.url() + "/", "/Evaluate", "{}", 100).body == "{}");
+  CHECK_THAT(server.Heard(),
+             Catch::Contains("\r\nHost: localhost:" + std::to_string(server.port()) + "\r\n"));
+  try {
+    const Serving serving({NextStates()}, "::1");
+    CHECK_THAT(serving.url(), Catch::StartsWith("http://[::1]:"));
+    CHECK_NOTHROW(RemoteModel(serving.url(), "next_states", 2, 4 * kOutcomes));
+  } catch (const std::runtime_error& error) {
+    WARN("without IPv6: " << error.what());
+  }
+}
+
+TEST_CASE("an answer of another status than success is an error, in its words or in ours") {
+  const auto ask = [](const std::string& body) {
+    const Saying server("HTTP/1.1 502 Bad Gateway\r\n\r\n" + body);
+    RemoteModel(server.url(), "next_states", 2, 4);
+  };
+  CHECK_THROWS_WITH(ask(R"({"inputSizes": [2]})"),
+                    Catch::EndsWith("/InputSizes is answered with status 502"));
+  CHECK_THROWS_WITH(ask(R"({"error": {"type": "Gone", "message": "try later"}})"),
+                    Catch::EndsWith("try later"));
+}
+
+TEST_CASE("who waits for a silent server may stop waiting") {
+  struct Stopped {};
+  asio::io_context context;
+  const tcp::acceptor silent(context, {asio::ip::address_v4::loopback(), 0});
+  int looks = 0;
+  const auto look = [&] {
+    if (++looks == 2) throw Stopped();
+  };
+  const std::string url = "http://127.0.0.1:" + std::to_string(silent.local_endpoint().port());
+  CHECK_THROWS_AS(RemoteModel(url, "next_states", 2, 4, look), Stopped);
 }
 
 }  // namespace plumb

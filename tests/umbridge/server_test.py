@@ -105,8 +105,8 @@ class Served(unittest.TestCase):
 
     def test_our_own_simulator_behind_a_server_is_calibrated_as_here(self):
         folder = pathlib.Path(self.folder.name)
-        calibrate = [PLUMB, "calibrate", ROBOT, "--csv", self.table, "--method", "laplace", "--horizons", "1"]
-        subprocess.run([*calibrate, "--output", folder / "here.json"], check=True, stdout=subprocess.DEVNULL)
+        calibrate = [PLUMB, "calibrate", ROBOT, "--csv", self.table, "--method", "laplace"]
+        subprocess.run([*calibrate, "--output", folder / "here.json", "--horizons", "1"], check=True, stdout=subprocess.DEVNULL)
         subprocess.run([*calibrate, "--output", folder / "there.json", "--model", self.url], check=True, stdout=subprocess.DEVNULL)
         here, there = (json.loads((folder / name).read_text()) for name in ("here.json", "there.json"))
         for mean, other, sd, other_sd in zip(here["mean"], there["mean"], here["sd"], there["sd"]):
@@ -171,6 +171,16 @@ class Served(unittest.TestCase):
             thread.join(PATIENCE)
         self.assertEqual(len(answers), 8)
         self.assertTrue(all(answer == answers[0] for answer in answers))
+
+    def test_who_calibrates_a_silent_simulator_may_stop(self):
+        with socket.create_server(("127.0.0.1", 0)) as silent:
+            url = f"http://127.0.0.1:{silent.getsockname()[1]}"
+            calibrate = subprocess.Popen([PLUMB, "calibrate", ROBOT, "--csv", self.table, "--model", url, "--output", pathlib.Path(self.folder.name) / "silent.json"],
+                                         stdout=subprocess.DEVNULL)
+            connection, _ = silent.accept()
+            with connection:
+                calibrate.send_signal(signal.SIGTERM)
+                self.assertEqual(calibrate.wait(PATIENCE), 130)
 
     def test_it_ends_when_it_is_told_to(self):
         server = subprocess.Popen([PLUMB, "serve-model", ROBOT, "--csv", self.table, "--address", "127.0.0.1:0"], stdout=subprocess.PIPE, text=True)

@@ -5,7 +5,7 @@ import { ask, state } from "./connection";
 import type { Service } from "./contract";
 import { number, withUnit } from "./format";
 import { driver_status_t } from "./messages";
-import { controller, driver, note, placing, robot } from "./run";
+import { controller, driver, gateway, note, placing, robot } from "./run";
 
 const NAMES: Record<Service, string> = { emergency_stop: "Emergency stop", arm: "Arm", disarm: "Disarm", confirm_placed: "Robot placed" };
 
@@ -19,12 +19,16 @@ export const outcome = signal<Outcome | null>(null);
 /** Which confirmation is open. */
 export const confirming = signal<"arm" | null>(null);
 
+let asked = 0;
+
 export async function request(service: Service) {
-  const what = NAMES[service];
+  const what = NAMES[service], mine = ++asked;
   outcome.value = { what, text: "asked; waiting for the driver's answer", state: "asked" };
-  const { ok, text } = await ask(service);
-  outcome.value = { what, text: text || (ok ? "done" : "refused"), state: ok ? "done" : "failed" };
-  note(Date.now() * 1000, "this page", `${what}: ${outcome.value.text}`, ok ? "note" : "bad");
+  const { ok, text: said } = await ask(service);
+  const text = said || (ok ? "done" : "refused");
+  // A late answer to an earlier wish does not hide that to a stop; it is among the events.
+  if (mine === asked) outcome.value = { what, text, state: ok ? "done" : "failed" };
+  note(Date.now() * 1000, "this page", `${what}: ${text}`, ok ? "note" : "bad");
 }
 
 export function stop() {
@@ -90,14 +94,17 @@ function Placing() {
 }
 
 export function Controls() {
-  const may = !!robot.value?.may_control && state.value === "open";
+  const open = state.value === "open";
+  const mayArm = open && !!robot.value?.may_control;
+  // Disarming is everybody's, as stopping is, but that a run in virtual time hears nobody.
+  const mayDisarm = open && gateway.value?.clock !== "virtual";
   const armed = driver.value?.state === driver_status_t.ARMED || driver.value?.state === driver_status_t.ARMING;
   const why = robot.value && !robot.value.may_control ? robot.value.why_not : "";
   return (
     <>
       <div class="controls" role="group" aria-label="Motors">
-        <button disabled={!may || armed} onClick={() => (confirming.value = "arm")}>Arm…</button>
-        <button disabled={!may || !armed} onClick={() => void request("disarm")}>Disarm</button>
+        <button disabled={!mayArm || armed} onClick={() => (confirming.value = "arm")}>Arm…</button>
+        <button disabled={!mayDisarm || !armed} onClick={() => void request("disarm")}>Disarm</button>
         {why && <p class="aside">{why}</p>}
       </div>
       <Placing />

@@ -29,10 +29,11 @@ Misspecification Judge(const RobotDescription& robot, const std::vector<Rollout>
   options.starts = 1;
   const CurriculumFit fit = FitCurriculum(model, log, options);
   int64_t steps = 0;
-  const Misspecification found = TestModel({model, log, fit.fit.posterior, fit.one_step, fit.rows,
-                                            fit.noise_sd, fit.noise_known},
-                                           threads, &steps)
-                                     .found;
+  const GaussianMixture posterior{{1}, {fit.fit.posterior}};
+  const Misspecification found =
+      TestModel({model, log, posterior, fit.one_step, fit.rows, fit.noise_sd, fit.noise_known},
+                threads, &steps)
+          .found;
   CHECK(steps > 0);
   return found;
 }

@@ -6,6 +6,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "calibrator/fit/robot_problem.h"
 #include "tests/calibrator/fitted_log.h"
 
 namespace plumb {
@@ -24,6 +25,8 @@ TEST_CASE("a method that is none is refused, naming the nearest") {
   CHECK_NOTHROW(RequireMethod("abc-smc"));
   CHECK_THROWS_WITH(RequireMethod("lapalce"),
                     "there is no method 'lapalce'; did you mean 'laplace'?");
+  for (const std::string& name : RobotDiscrepancies()) CHECK_NOTHROW(RequireDiscrepancy(name));
+  CHECK_THROWS_WITH(RequireDiscrepancy("nonsense"), Catch::Contains("nonsense"));
 }
 
 TEST_CASE("a budget beyond 32 bits is one") {

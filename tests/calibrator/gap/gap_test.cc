@@ -40,7 +40,7 @@ Gaussian Considered(const RobotDescription& robot, const std::vector<Rollout>& r
   const MethodInput input{std::make_shared<Model>(robot), rollouts, options};
   const MethodResult result = RunMethod(input);
   int64_t steps = 0;
-  return TestModel(input, result, ViewOneStep(input, result), &steps).considered;
+  return Moments(TestModel(input, result, ViewOneStep(input, result), &steps).considered);
 }
 
 // Mean squared errors of the velocities of a log's steps of a condition, without and with the
@@ -263,6 +263,28 @@ TEST_CASE("of differences for velocities the posterior is as wide as what may be
   };
   CHECK(off(Moments(alone.posterior)) > 10);
   CHECK(off(Moments(fit.result.posterior)) < 2.5);
+}
+
+TEST_CASE("several modes stay several where nobody can tell whether the model is right") {
+  const RobotDescription robot = Hopper();
+  const auto log = RandomLog(robot, {}, 400, 3);
+  const CalibrationOptions options = Options();
+  const MethodInput input{std::make_shared<Model>(robot), log, options};
+  MethodResult both = RunMethod(input);
+  const Gaussian mode = Moments(both.posterior);
+  Gaussian other = mode;
+  other.mean(0) += 20 * std::sqrt(mode.covariance(0, 0));
+  both.posterior = {{0.25, 0.75}, {mode, other}};
+  const MethodResult kept = CloseGap(input, both, "nobody has read the velocities").result;
+  CHECK(kept.posterior.weights == both.posterior.weights);
+  REQUIRE(kept.posterior.components.size() == 2);
+  for (size_t k : {0, 1}) {
+    const Gaussian &before = both.posterior.components[k], &now = kept.posterior.components[k];
+    CHECK(now.covariance(0, 0) >= before.covariance(0, 0) * (1 - 1e-9));
+  }
+  const Eigen::ArrayXd drawn = kept.samples.row(0).transpose();
+  const double between = (mode.mean(0) + other.mean(0)) / 2;
+  CHECK((drawn > between).cast<double>().mean() == Approx(0.75).margin(0.1));
 }
 
 TEST_CASE("of too few steps nothing is learnt, and there is nothing that it explains") {

@@ -70,18 +70,28 @@ TEST_CASE("any number of threads and any interruption give the same bits") {
   SECTION("the roll-outs are those of this calibration, whatever a longer one has left") {
     std::filesystem::copy_file(folder.path() / "rollout_1.checkpoint",
                                folder.path() / "rollout_2.checkpoint");
-    CHECK(LoadRollouts(folder.path()).size() == 2);
-    CHECK(LoadRollouts(folder.path() / "none").empty());
+    CHECK(LoadRollouts(folder.path(), robot).size() == 2);
+    CHECK(LoadRollouts(folder.path() / "none", robot).empty());
   }
   SECTION("another description's checkpoint is refused") {
     RobotDescription edited = robot;
     edited.fingerprint ^= 1;
     CHECK_THROWS_WITH(CalibrationCheckpoint(folder.path(), edited, 9).Load(),
                       Catch::Contains("another robot.toml"));
+    CHECK_THROWS_WITH(LoadRollouts(folder.path(), edited),
+                      Catch::Contains("calibration.checkpoint: was made with another robot.toml"));
+    edited = robot;
+    edited.parameters.pop_back();
+    CHECK_THROWS_WITH(LoadRollouts(folder.path(), edited),
+                      Catch::Contains("calibration.checkpoint: is another robot's"));
   }
   SECTION("another seed's checkpoint is refused") {
     CHECK_THROWS_WITH(CalibrationCheckpoint(folder.path(), robot, 10).Load(),
                       Catch::Contains("another seed"));
+  }
+  SECTION("another method's checkpoint is refused") {
+    SimOpt other(robot, 9, 1, "laplace");
+    CHECK_THROWS_WITH(other.Resume(*resumed), Catch::Contains("made by method reps, not laplace"));
   }
   SECTION("a damaged checkpoint is refused, naming the file") {
     std::ofstream(folder / "rollout_1.checkpoint") << "{\"episode\": 3";
@@ -291,7 +301,7 @@ TEST_CASE("a run of days takes no more memory: the oldest roll-outs are forgotte
   const Rollout third = SyntheticRollout(robot, kTruth, kSteps, 1e-4, 0.01, 2);
   CHECK(state.rollouts[0].transitions[7].v == third.transitions[7].v);
   // Nothing of the record is lost, and who takes it up goes on alike.
-  CHECK(LoadRollouts(folder.path()).size() == 6);
+  CHECK(LoadRollouts(folder.path(), robot).size() == 6);
   SimOpt resumed(robot, 9, 1);
   resumed.Resume(checkpoint.Load().value());
   CHECK(resumed.state().forgotten == 2);
@@ -334,6 +344,8 @@ TEST_CASE("no bit of a checkpoint can be changed unnoticed, nor a size be wrong"
   state.rollouts[0].transitions[0].v_sd.setConstant(2, 0.25);
   CalibrationCheckpoint(folder.path(), robot, 1).Save(state);
   CHECK_THROWS_WITH(load(), Catch::Contains("wrong size"));
+  CHECK_THROWS_WITH(LoadRollouts(folder.path(), robot),
+                    Catch::Contains("rollout_0.checkpoint: a transition has the wrong size"));
   state.rollouts[0].transitions[0].v_sd.setConstant(1, 1e-160);
   CalibrationCheckpoint(folder.path(), robot, 1).Save(state);
   CHECK_THROWS_WITH(load(), Catch::Contains("not physical"));

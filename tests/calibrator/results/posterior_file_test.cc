@@ -14,6 +14,7 @@
 #include "robot/residual_json.h"
 #include "tests/calibrator/sample_findings.h"
 #include "tests/calibrator/synthetic.h"
+#include "tests/sim/robots.h"
 #include "tests/temporary_file.h"
 
 namespace plumb {
@@ -59,6 +60,21 @@ TEST_CASE("a residual and starts read back to the same bits") {
     CHECK(is.noise == was.noise);
     CHECK(is.bound == was.bound);
   }
+}
+
+TEST_CASE("a robot with a floating base has one position more than velocities, and reads back") {
+  const RobotDescription robot = LoadRobot(SourceFile("robots/quadruped/robot.toml"));
+  REQUIRE(robot.num_positions() == robot.num_velocities() + 1);
+  Findings findings = SampleFindings(robot);
+  Eigen::VectorXd start = Eigen::VectorXd::Zero(robot.num_positions() + robot.num_velocities());
+  start(3) = 1;  // the quaternion's w
+  findings.starts = {start};
+  const TemporaryFile file(PosteriorJson(findings, robot, {}), ".json");
+  const ParameterDistribution read = ReadPosterior(file.path(), robot);
+  CHECK(read.starts == findings.starts);
+  REQUIRE(read.residual);
+  REQUIRE(read.residual->touching);
+  CHECK(read.residual->touching->weights == findings.gap.residual->touching->weights);
 }
 
 TEST_CASE("of the version before residuals a posterior has none") {

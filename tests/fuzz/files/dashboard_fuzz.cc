@@ -17,10 +17,9 @@ bool IsJson(const std::string& payload, size_t from) {
 }
 
 void TakeAll(Viewer& viewer) {
-  while (!viewer.outbox.empty()) {
-    const Outbox::Item item = viewer.outbox.Pop();
-    const bool answers = item.binary && !item.is_message();
-    Require(item.tells_time() || IsJson(*item.payload, answers ? 17 : 0));
+  while (const auto item = viewer.outbox.Pop()) {
+    const bool answers = item->binary && !item->is_message();
+    Require(item->tells_time() || IsJson(*item->payload, answers ? 17 : 0));
   }
 }
 
@@ -56,7 +55,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       access.OriginAllowed(text, text);
       if (access.HostAllowed(text)) Require(!text.empty());
       Require(!access.TokenGiven(text) || text.find("0123") != std::string_view::npos);
-      Require(!Page(PendulumFile("..")).Find("/" + std::string(text)) || text.empty());
+      Require(!PageFolder(PendulumFile("..")).Find("/" + std::string(text)) || text.empty());
     } else if (kind == 4) {
       TakeAll(who);
     } else {

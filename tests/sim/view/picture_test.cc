@@ -76,6 +76,11 @@ TEST_CASE("a strip is a PNG picture of so many panels, a film a GIF one") {
   CHECK(film.substr(0, 6) == "GIF89a");
   CHECK(film.back() == ';');
   CHECK(film == DrawFilm(robot, Swing(50, 0.05)));
+  // in real time, also where states are seldom: 25 pictures per second until 2.45 s
+  const std::string frame = "\x21\xF9\x04";  // a graphic control extension
+  int frames = 0;
+  for (size_t at = film.find(frame); at != film.npos; at = film.find(frame, at + 1)) ++frames;
+  CHECK(frames == 63);
   CHECK_THROWS_AS(DrawStrip(robot, {}), std::invalid_argument);
   CHECK_THROWS_AS(DrawFilm(robot, {}), std::invalid_argument);
 }
