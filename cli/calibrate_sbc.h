@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstddef>
 #include <vector>
 
 #include "calibrator/fit/method.h"
@@ -8,12 +7,6 @@
 #include "robot/description.h"
 
 namespace plumb {
-
-/// How many posteriors it takes at least: with fewer, simulation-based calibration does not find
-/// out ones that are as wrong as can be, that is, whose truths are all on one side of them, all
-/// outside them, or all in their very middle. Thread-safe.
-/// @param draws of each posterior, 2 at least. @param tests that are made of them.
-int FewestPosteriors(int draws, size_t tests);
 
 /// `plumb calibrate --sbc`: looks whether Laplace's posteriors of motions like these cover what
 /// they say (RunRobotSbc), and prints that. Has threads of its own; call it from one.

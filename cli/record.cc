@@ -35,6 +35,7 @@ int Record(Process& process, const RecordFlags& flags) {
   int64_t messages = 0;
   const auto all =
       messenger.Subscribe(".*", [&](const std::string& channel, std::span<const uint8_t> message) {
+        if (failure) return;  // nothing is written behind half a message
         try {
           log.Write(process.clock().Utime(), channel, message);
           folder.Hear(channel, message);

@@ -121,6 +121,16 @@ void Config::FailMisspelt(const std::string& key) const {
   }
 }
 
+namespace {
+
+// A whole number beyond 2^53 is rounded, too: toml++ has no double of one.
+double NumberOf(const toml::node& node) {
+  if (const auto* whole = node.as_integer()) return static_cast<double>(whole->get());
+  return node.as_floating_point()->get();
+}
+
+}  // namespace
+
 double Config::Number(const std::string& key, Range range, std::optional<double> fallback) {
   if (!Has(key)) {
     if (fallback) return *fallback;
@@ -128,7 +138,7 @@ double Config::Number(const std::string& key, Range range, std::optional<double>
   }
   const toml::node* node = table().get(key);
   if (!node->is_number()) Fail(key, "is not a number");
-  const double value = *node->value<double>();
+  const double value = NumberOf(*node);
   if (!Inside(value, range)) Fail(key, fmt::format("= {} is not {}", value, Describe(range)));
   return value;
 }
@@ -191,7 +201,7 @@ std::vector<double> Config::Numbers(const std::string& key, size_t size, Range r
   std::vector<double> values;
   for (const toml::node& node : *array) {
     if (!node.is_number()) Fail(key, "is not an array of numbers");
-    values.push_back(*node.value<double>());
+    values.push_back(NumberOf(node));
     if (!Inside(values.back(), range))
       Fail(key, fmt::format("contains {}, not {}", values.back(), Describe(range)));
   }

@@ -38,9 +38,15 @@ LcmLogReader::LcmLogReader(std::string file) : file_(std::move(file)) {
   if (!stream_) throw std::runtime_error(file_ + ": cannot be opened");
 }
 
+void LcmLogReader::RequireReadable() const {
+  if (stream_.bad())
+    throw std::runtime_error(fmt::format("{}: cannot be read at byte {}", file_, position_));
+}
+
 bool LcmLogReader::ReadHead(Head& head) {
   std::array<char, kHead> bytes;
   stream_.read(bytes.data(), bytes.size());
+  RequireReadable();
   cut_off_ = !stream_ && stream_.gcount() > 0;
   if (!stream_) return false;
   head = {static_cast<int64_t>(BigEndian<uint64_t>(&bytes[12])), BigEndian<uint32_t>(&bytes[20]),
@@ -61,6 +67,7 @@ bool LcmLogReader::Read(LcmLogEvent& event) {
   event.data.resize(head.data);
   stream_.read(event.channel.data(), head.channel);
   stream_.read(reinterpret_cast<char*>(event.data.data()), head.data);
+  RequireReadable();
   cut_off_ = !stream_;
   if (cut_off_) return false;
   position_ += static_cast<int64_t>(kHead) + head.channel + head.data;
@@ -73,6 +80,7 @@ bool LcmLogReader::Skip(int64_t& utime) {
   utime = head.utime;
   const int64_t rest = static_cast<int64_t>(head.channel) + head.data;
   stream_.ignore(rest);
+  RequireReadable();
   cut_off_ = stream_.gcount() < rest;
   if (cut_off_) return false;
   position_ += static_cast<int64_t>(kHead) + head.channel + head.data;

@@ -42,6 +42,7 @@ class LcmLogReader {
     uint32_t channel, data;  // lengths
   };
   bool ReadHead(Head& head);
+  void RequireReadable() const;
 
   std::string file_;
   std::ifstream stream_;

@@ -153,6 +153,7 @@ class Subscriber {
       const std::span<const uint8_t> message = Unsealed(bytes);
       const int length = static_cast<int>(message.size());
       if (arriving_.decode(message.data(), 0, length) != length) {
+        arriving_ = {};  // which may be a hundred times as large as what it was refused for
         ++rejected_;
         return;
       }

@@ -20,6 +20,7 @@
 #include <limits>
 #include <memory>
 #include <stdexcept>
+#include <vector>
 
 #include "common/lcm_url.h"
 #include "common/nearest_name.h"
@@ -43,22 +44,36 @@ ServiceNotice& Notice() {
   return notice;
 }
 
-constexpr int kStopSignals[] = {SIGINT, SIGTERM, SIGHUP};
+// Hanging up stops nobody who was started to outlive it, as nohup starts a program: blocked, an
+// ignored signal would still reach us.
+std::vector<int> FindStopSignals() {
+  struct sigaction hangup {};
+  sigaction(SIGHUP, nullptr, &hangup);
+  if (hangup.sa_handler == SIG_IGN) return {SIGINT, SIGTERM};
+  return {SIGINT, SIGTERM, SIGHUP};
+}
 
-sigset_t StopSignals() {
+const std::vector<int>& StopSignals() {
+  static const std::vector<int> signals = FindStopSignals();
+  return signals;
+}
+
+sigset_t SetOfStopSignals() {
   sigset_t set;
   sigemptyset(&set);
-  for (const int signal : kStopSignals) sigaddset(&set, signal);
+  for (const int signal : StopSignals()) sigaddset(&set, signal);
   return set;
 }
 
 int BlockStopSignals() {
-  const sigset_t set = StopSignals();
+  const sigset_t set = SetOfStopSignals();
   // Before any thread exists (LCM starts one), so that all of them inherit the mask.
   sigprocmask(SIG_BLOCK, &set, nullptr);
   ::signal(SIGPIPE, SIG_IGN);
   // A file that may not grow is an error with its name, as a full disk is.
   ::signal(SIGXFSZ, SIG_IGN);
+  // Or nobody would ever hear that a child has ended, where our parent ignores his.
+  ::signal(SIGCHLD, SIG_DFL);
   const int fd = signalfd(-1, &set, SFD_NONBLOCK | SFD_CLOEXEC);
   if (fd < 0) throw std::runtime_error("signalfd failed");
   return fd;
@@ -98,8 +113,8 @@ Messenger& Process::messenger() {
 }
 
 void Process::EndAtOnce() {
-  for (const int signal : kStopSignals) ::signal(signal, [](int) { _exit(130); });
-  const sigset_t set = StopSignals();
+  for (const int signal : StopSignals()) ::signal(signal, [](int) { _exit(130); });
+  const sigset_t set = SetOfStopSignals();
   sigprocmask(SIG_UNBLOCK, &set, nullptr);
 }
 

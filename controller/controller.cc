@@ -109,12 +109,18 @@ void Controller::TakePolicy() {
 }
 
 void Controller::OnDriverStatus(const driver_status_t& status, int64_t now) {
+  if (status.state != driver_status_t::ARMED) halted_ = false;
+  SeeDriver(status, now);
+}
+
+void Controller::SeeDriver(const driver_status_t& status, int64_t now) {
   const bool was_armed = Armed();
   driver_state_ = status.state;
   driver_reason_ = status.reason;
   driver_heard_ = now;
   if (Armed() == was_armed) return;
   if (Armed()) {
+    if (halted_) return;
     Enter(controller_status_t::WAITING, policy_ || plays_ ? "" : "no policy yet");
     state_heard_ = -1;
   } else if (phase() != controller_status_t::COMPLETE) {
@@ -144,6 +150,7 @@ joint_command_t Controller::ZeroCommand(int64_t utime) {
 
 joint_command_t Controller::Halt(const std::string& reason, int64_t utime) {
   if (phase() == controller_status_t::RUNNING) ++status_.episodes_aborted;
+  halted_ = true;
   Enter(controller_status_t::HALTED, reason);
   return ZeroCommand(utime);
 }
@@ -153,7 +160,7 @@ std::optional<joint_command_t> Controller::Tick(int64_t now, int64_t utime) {
     driver_status_t silent{};
     silent.state = driver_status_t::ABSENT;
     silent.reason = "it is silent";
-    OnDriverStatus(silent, driver_heard_);
+    SeeDriver(silent, driver_heard_);  // of which nobody has said that it is disarmed
   }
   if (place_ && !let_go_ && now - placing_since_ >= kLetGo) {
     let_go_ = true;
@@ -235,6 +242,7 @@ std::optional<joint_command_t> Controller::OnState(const robot_state_t& state, i
     return Act(state, utime);
   }
   if (phase() == controller_status_t::WAITING && Armed() && (policy_ || plays_) && good) {
+    if (next_policy_) TakePolicy();  // it came in an episode that was aborted
     const bool more = status_.num_episodes < status_.episodes_wanted;
     if (more)
       BeginPlacing(now, utime);

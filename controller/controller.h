@@ -70,6 +70,7 @@ class Controller {
   bool Armed() const { return driver_state_ == driver_status_t::ARMED; }
   void Enter(int8_t phase, const std::string& reason = {});
   void TakePolicy();
+  void SeeDriver(const driver_status_t& status, int64_t now);
   void BeginPlacing(int64_t now, int64_t utime);
   bool ReadyToRun(const robot_state_t& state, int64_t now) const;
   bool Placed(const robot_state_t& state) const;
@@ -87,9 +88,10 @@ class Controller {
   std::vector<int> driven_;  // joints
   uint64_t seed_;
   double rest_;
-  Decide decide_;       // empty: the policy does
-  bool plays_ = false;  // what is decided needs no policy
-  int most_steps_;      // of an episode
+  Decide decide_;        // empty: the policy does
+  bool halted_ = false;  // since the driver has last said that it is not armed
+  bool plays_ = false;   // what is decided needs no policy
+  int most_steps_;       // of an episode
   std::unique_ptr<GaussianPolicy> policy_, next_policy_;
   policy_t policy_header_{}, next_header_{};  // without weights
   controller_status_t status_{};

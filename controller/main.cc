@@ -28,8 +28,9 @@ int main(int argc, char** argv) {
             ->check(plumb::SeedRange())
             ->capture_default_str();
         app.add_option(
-            "--rest", rest,
-            "[s] do not have the robot placed: let it rest that long, then begin where it is");
+               "--rest", rest,
+               "[s] do not have the robot placed: let it rest that long, then begin where it is")
+            ->check(CLI::Range(0.0, 1e6));
         app.add_option("--efforts", efforts,
                        "play this table of `plumb excite` in one episode, and no policy");
         plumb::AddExamples(app, {"plumb-controller robots/pendulum --rest 2"});

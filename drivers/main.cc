@@ -181,15 +181,16 @@ class DriverProcess {
     phases_.End(PhaseTimes::kSend);
     const int64_t sent = clock_.Utime();
     driver_.Transmitted(accepted_, sent);
-    const bool fault = driver_.state() == DriveState::kFault;
     for (size_t i = 0; i < buses_.size(); ++i) {
       FlightRecorder& recorder = buses_[i].recorder;
       const auto accepted = static_cast<size_t>(std::max(accepted_[i], 0));
       for (const Frame& frame : driver_.frames(i).first(accepted))
         recorder.Record(frame, true, sent);
-      if (fault && !faulty_) recorder.Dump(sent - kFlight, sent, driver_.reason());
+      // Again in the next cycle, where the last one is still being written.
+      int64_t& dumped = buses_[i].faults_dumped;
+      if (dumped != driver_.faults() && recorder.Dump(sent - kFlight, sent, driver_.reason()))
+        dumped = driver_.faults();
     }
-    faulty_ = fault;
     if (now >= next_reopen_) Reopen(now);
     if (driver_.revision() == revision_ && now < next_status_) return;
     PublishStatus();
@@ -263,7 +264,6 @@ class DriverProcess {
   Subscriber<driver_request_t> requests_;
   std::array<Frame, 64> received_;
   PhaseTimes phases_{!clock_.is_virtual()};
-  bool faulty_ = false;
   // something has failed: nobody on LCM is heard or told any more, the drives come first
   bool deaf_ = false;
   int64_t next_reopen_ = 0;

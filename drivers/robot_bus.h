@@ -25,6 +25,7 @@ struct RobotBus {
 
   std::unique_ptr<Transport> transport;
   FlightRecorder recorder;
+  int64_t faults_dumped = 0;  ///< of Driver::faults, how many it has written the frames before
 };
 
 /// Opens them, in the robot's order, for the frames that the driver listens to. @param

@@ -119,6 +119,8 @@ std::vector<Misfit> TestScale(const ProjectedErrors& errors, const std::vector<b
     const auto own = [&](int other) { return other == c; };
     const Rows contact = Where(errors, own, "contact"), free = Where(errors, own, "free");
     if (contact.size() < kFewestRows || free.size() < kFewestRows) continue;
+    // What rests has no errors that could be compared.
+    if (SumOfSquares(errors, contact) + SumOfSquares(errors, free) == 0) continue;
     tests.push_back(CompareConditions(errors, c, contact, free));
   }
   return tests;

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "calibrator/inference/chi_squared.h"
 #include "common/special_numbers.h"
@@ -18,6 +20,7 @@ constexpr int kFewestPerBin = 5;
 constexpr int kMaxPoints = 100;                   // at which distribution functions are compared
 constexpr double kNegligibleProbability = 1e-20;  // a probability
 constexpr double kSignificant = 0.01;
+constexpr int kMostToTell = 100;  // posteriors; of three draws or fewer the worst are hardly told
 constexpr uint32_t kTieStream = 0x54494553;  // "TIES"
 
 /// Probabilities of a binomial distribution, by logarithms of factorials.
@@ -88,11 +91,14 @@ int Rank(double truth, const Eigen::VectorXd& draws, Random& ties) {
   return below + (equal > 0 ? static_cast<int>(ties.Uniform() * (equal + 1)) : 0);
 }
 
-// The quantity that is most wrong, in standard errors of uniform ranks' mean and variance.
-std::string Verdict(const SbcUniformity& quantity, double runs, size_t tests) {
-  if (std::isnan(quantity.chi2_p)) return "unknown";
-  const double p = std::min(quantity.chi2_p, quantity.ecdf_p);
-  if (p * static_cast<double>(tests) >= kSignificant) return "calibrated";
+bool Significant(double chi2_p, double ecdf_p, size_t tests) {
+  return std::min(chi2_p, ecdf_p) * static_cast<double>(tests) < kSignificant;
+}
+
+// In what way it is wrong most, in standard errors of uniform ranks' mean and variance.
+std::string Verdict(const SbcUniformity& quantity, double runs, size_t tests, bool enough) {
+  if (!Significant(quantity.chi2_p, quantity.ecdf_p, tests))
+    return enough && !std::isnan(quantity.chi2_p) ? kSbcCalibrated : kSbcUnknown;
   const double shift = (quantity.mean - 0.5) * std::sqrt(12 * runs);
   const double width = (12 * quantity.variance - 1) * std::sqrt(runs / 0.8);
   if (std::abs(shift) > std::abs(width)) return shift > 0 ? "too low" : "too high";
@@ -227,8 +233,36 @@ SbcResult RunSbc(const Prior& prior, const SbcFit& fit, const std::vector<SbcQua
   return result;
 }
 
+int FewestPosteriors(int draws, size_t tests) {
+  const std::array<std::pair<int, int>, 3> worst_ranks{
+      {{0, 0}, {0, draws}, {draws / 2, (draws + 1) / 2}}};
+  std::array<std::vector<int>, 3> ranks;
+  for (int posteriors = 1; posteriors < kMostToTell; ++posteriors) {
+    bool found_out = true;
+    for (size_t i = 0; i < ranks.size(); ++i) {
+      const auto& [one, other] = worst_ranks[i];
+      ranks[i].push_back(posteriors % 2 == 1 ? one : other);
+      found_out = found_out && Significant(UniformityByChi2(ranks[i], draws),
+                                           UniformityByEcdf(ranks[i], draws), tests);
+    }
+    if (found_out) return posteriors;
+  }
+  return kMostToTell;
+}
+
+std::vector<std::string> SbcVerdicts(const SbcResult& result) {
+  const int posteriors = result.runs - result.failures;
+  const size_t tests = 2 * result.quantities.size();
+  const bool enough = posteriors > 0 && posteriors >= FewestPosteriors(result.draws, tests);
+  std::vector<std::string> verdicts;
+  for (const SbcUniformity& quantity : result.quantities)
+    verdicts.push_back(Verdict(quantity, posteriors, tests, enough));
+  return verdicts;
+}
+
 std::string SbcSummary(const SbcResult& result) {
   const int posteriors = result.runs - result.failures;
+  const std::vector<std::string> verdicts = SbcVerdicts(result);
   size_t width = 8;
   for (const SbcUniformity& quantity : result.quantities)
     width = std::max(width, quantity.name.size());
@@ -238,12 +272,21 @@ std::string SbcSummary(const SbcResult& result) {
                   result.failures > 0 ? ": of these nothing is known" : "");
   text += fmt::format("{:<{}}  {:>8}  {:>8}  {:>6}  {:>6}  {:>6}  posterior\n", "quantity", width,
                       "chi2 p", "ECDF p", "50 %", "80 %", "95 %");
-  for (const SbcUniformity& quantity : result.quantities) {
+  for (size_t i = 0; i < verdicts.size(); ++i) {
+    const SbcUniformity& quantity = result.quantities[i];
     text += fmt::format("{:<{}}  {:>8.2g}  {:>8.2g}", quantity.name, width, quantity.chi2_p,
                         quantity.ecdf_p);
     for (const double coverage : quantity.coverage)
       text += fmt::format("  {:>6.1f}", 100 * coverage);
-    text += "  " + Verdict(quantity, posteriors, 2 * result.quantities.size()) + "\n";
+    text += "  " + verdicts[i] + "\n";
+  }
+  const int fewest =
+      result.draws > 0 ? FewestPosteriors(result.draws, 2 * result.quantities.size()) : 0;
+  if (posteriors < fewest) {
+    text += fmt::format(
+        "unknown: {} posteriors are too few to tell; with fewer than {} not even those that are as "
+        "wrong as can be are found out\n",
+        posteriors, fewest);
   }
   return text;
 }

@@ -84,8 +84,19 @@ SbcResult RunSbc(const Prior& prior, const SbcFit& fit, const std::vector<SbcQua
 double UniformityByChi2(const std::vector<int>& ranks, int draws);
 double UniformityByEcdf(const std::vector<int>& ranks, int draws);
 
-/// A table for the terminal, a line for each quantity: p-values, coverage, and in what way the
-/// posterior is wrong where it is at the 1 % level, corrected for the number of tests.
+/// How many posteriors it takes at least: with fewer, the tests do not find out ones that are as
+/// wrong as can be, that is, whose truths are all on one side of them, all outside them, or all in
+/// their very middle. 14 for ten tests of 99 draws; 100 at most.
+/// @param draws of each posterior, 2 at least. @param tests that are made of them.
+int FewestPosteriors(int draws, size_t tests);
+
+inline constexpr char kSbcCalibrated[] = "calibrated", kSbcUnknown[] = "unknown";
+/// Of each quantity: in what way the posterior is wrong, if its tests say so at the 1 % level,
+/// corrected for their number ("too sure", "too low", ...), else kSbcCalibrated, or kSbcUnknown
+/// where there are fewer than FewestPosteriors.
+std::vector<std::string> SbcVerdicts(const SbcResult& result);
+
+/// A table for the terminal, a line for each quantity: p-values, coverage and verdict.
 std::string SbcSummary(const SbcResult& result);
 
 }  // namespace plumb

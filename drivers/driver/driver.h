@@ -88,6 +88,7 @@ class Driver {
   bool confirmed_idle() const noexcept;
   /// Changes whenever a state or reason changes.
   uint64_t revision() const noexcept { return revision_; }
+  int64_t faults() const noexcept { return faults_; }  ///< that it has fallen into so far
   /// The message to publish, to which the caller may add what only it knows; valid until the next
   /// call.
   /// @param stats of each bus's transport; empty: there are none.
@@ -150,6 +151,7 @@ class Driver {
     reason_ = cause_;
     Disarm();
     mode_ = Mode::kFault;
+    ++faults_;
   }
   static std::vector<Joint> DrivenJoints(const RobotDescription& robot);
   /// @throws std::invalid_argument if one cannot work.
@@ -237,6 +239,7 @@ class Driver {
   driver_status_t status_;
   int64_t requests_rejected_ = 0;
   uint64_t revision_ = 0;
+  int64_t faults_ = 0;
   uint64_t signature_ = 0;
 };
 

@@ -65,7 +65,7 @@ bool Driver::Agree(const SecondEncoder& second, Reason& why) const noexcept {
   const Joint& joint = joints_[second.joint];
   const JointSensor& sensor = sensors_[second.sensor];
   if (!joint.measured || !sensor.fresh(now_)) return true;
-  if (std::min(joint.measured_at, sensor.heard_at()) <= displaced_at_) return true;  // of before
+  if (std::min(joint.measured_at, sensor.taken_at()) <= displaced_at_) return true;  // of before
   double difference = sensor.newest().position - joint.latest.position;
   // Neither knows how often the joint has turned round.
   if (joint.turns) difference = std::remainder(difference, 2 * std::numbers::pi);

@@ -43,13 +43,20 @@ SensorUse JointSensor::OnFrame(const Frame& frame, int64_t now, int64_t utime) n
   if (use != SensorUse::kReading) return use;
   heard_ = true;
   heard_at_ = now;
-  if (const EncoderReading* reading = device_->encoder()) newest_ = OfEncoder(*reading);
+  if (const EncoderReading* reading = device_->encoder()) Take(OfEncoder(*reading), now, utime);
   if (const ImuSample* sample = device_->imu()) {
     imu_samples_.Add(*sample, utime);
-    newest_ = OfImu(*sample);
+    if (joint_ >= 0 && sample->orientation_valid) Take(OfImu(*sample), now, utime);
   }
-  if (joint_ >= 0 && std::isfinite(newest_.position)) samples_.Add(newest_, utime);
   return use;
+}
+
+void JointSensor::Take(const JointMeasurement& measurement, int64_t now, int64_t utime) noexcept {
+  if (!std::isfinite(measurement.position)) return;
+  newest_ = measurement;
+  taken_ = true;
+  taken_at_ = now;
+  samples_.Add(newest_, utime);
 }
 
 JointMeasurement JointSensor::OfEncoder(const EncoderReading& reading) const noexcept {
@@ -63,15 +70,14 @@ Eigen::Quaterniond JointSensor::LinkOrientation(const ImuSample& sample) const n
 }
 
 JointMeasurement JointSensor::OfImu(const ImuSample& sample) noexcept {
-  JointMeasurement measurement = newest_;
-  if (joint_ < 0 || !sample.orientation_valid) return measurement;
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   const double twist = mounting_.Angle(LinkOrientation(sample));
   // The one of the angles that look like this which is next to the last.
   const double near = std::isfinite(newest_.position) && turns_counted_ ? newest_.position : 0;
   turns_counted_ = true;
-  measurement.position = near + std::remainder(twist - near, 2 * std::numbers::pi);
-  measurement.velocity = mounting_.axis.dot(to_link_ * Vector(sample.rate));
-  return measurement;
+  const double rate = mounting_.axis.dot(to_link_ * Vector(sample.rate));
+  return {near + std::remainder(twist - near, 2 * std::numbers::pi), sample.clipped ? kNone : rate,
+          kNone};
 }
 
 const JointMeasurement& JointSensor::At(int64_t utime) noexcept {
@@ -90,8 +96,10 @@ Reason JointSensor::Silent(int64_t now) const noexcept {
     reason.Set("{}", device_->reason());
   } else if (!heard_ || now - heard_at_ > stale_after_) {
     reason.Set("no reading for {} ms", heard_ ? (now - heard_at_) / 1000 : stale_after_ / 1000);
-  } else if (joint_ >= 0 && !std::isfinite(newest_.position)) {
+  } else if (joint_ >= 0 && !taken_) {
     reason.Set("it does not trust its orientation yet");
+  } else if (joint_ >= 0 && now - taken_at_ > stale_after_) {
+    reason.Set("it has not trusted its orientation for {} ms", (now - taken_at_) / 1000);
   }
   return reason;
 }

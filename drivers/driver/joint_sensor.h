@@ -21,7 +21,8 @@ namespace plumb {
 /// joint, how a link turns.
 ///
 /// An encoder measures its joint. An IMU measures how its link turns, and with that the joint that
-/// turns it, see ImuMounting.
+/// turns it, see ImuMounting: not while it does not trust its orientation, and no rate that is
+/// beyond its range.
 ///
 /// No method but the constructor throws or allocates. Not thread-safe. `now` is scaled monotonic,
 /// `utime` scaled real time [us].
@@ -54,8 +55,8 @@ class JointSensor {
   int64_t measured() const noexcept { return measured_; }  ///< utime of what At has given
   /// The newest position, which At may not have given yet.
   const JointMeasurement& newest() const noexcept { return newest_; }
-  int64_t heard_at() const noexcept { return heard_at_; }  ///< `now` of the newest reading
-  /// Whether readings come, and the newest is not too old.
+  int64_t taken_at() const noexcept { return taken_at_; }  ///< `now` of that
+  /// Whether readings come, of the joint if it measures one, and the newest is not too old.
   bool fresh(int64_t now) const noexcept { return !Silent(now).text().size(); }
   /// Why it is not fresh; empty if it is.
   Reason Silent(int64_t now) const noexcept;
@@ -69,6 +70,7 @@ class JointSensor {
  private:
   JointMeasurement OfEncoder(const EncoderReading& reading) const noexcept;
   JointMeasurement OfImu(const ImuSample& sample) noexcept;
+  void Take(const JointMeasurement& measurement, int64_t now, int64_t utime) noexcept;
   Eigen::Quaterniond LinkOrientation(const ImuSample& sample) const noexcept;
 
   std::string name_;
@@ -87,8 +89,9 @@ class JointSensor {
   JointMeasurement given_, newest_;
   int64_t measured_ = 0;
   bool turns_counted_ = false;
-  bool heard_ = false;
-  int64_t heard_at_ = 0;  // `now` of the newest
+  bool heard_ = false, taken_ = false;
+  int64_t heard_at_ = 0,
+          taken_at_ = 0;  // `now` of the newest reading, and measurement of the joint
 };
 
 }  // namespace plumb

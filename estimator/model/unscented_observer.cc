@@ -17,6 +17,11 @@ constexpr double kSurely = 5;  // standard deviations
 // A JOINT_STATE has one number per joint. A semi-implicit step is of first order: with substeps as
 // long as gym's, its error would be greater than the noise.
 RobotDescription ForFilter(RobotDescription robot) {
+  if (robot.estimator.base == EstimatorSettings::Base::kLegs) {
+    throw std::invalid_argument(
+        "base = \"legs\": the filter on the simulator's dynamics reads neither feet nor "
+        "accelerometer, and nothing else tells where the base is");
+  }
   robot.simulation.integrator = SimulationSettings::Integrator::kLeapfrog;
   for (const JointDescription& joint : robot.joints) {
     if (joint.type != JointDescription::Type::kSpherical) continue;

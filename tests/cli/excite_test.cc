@@ -52,6 +52,15 @@ TEST_CASE(
   CHECK(Read(folder / "a.csv") != Read(folder / "b.csv"));
 }
 
+TEST_CASE("a program that was started to outlive its terminal does") {
+  // as nohup starts it; it is hung up on before it can look
+  const Outcome outcome =
+      Shell("trap '' HUP; exec env --block-signal=HUP sh -c 'kill -HUP $$; exec " + Plumb() +
+            "excite " + Robot("pendulum") + " --candidates 2 --seconds 1'");
+  INFO(outcome.text);
+  CHECK(outcome.status == 0);
+}
+
 TEST_CASE("excite: one joint after the other moves if it is to be so") {
   const TemporaryFolder folder;
   const Outcome outcome = Excite(

@@ -32,6 +32,14 @@ TEST_CASE("values are read with their type and range") {
   config.Finish();
 }
 
+TEST_CASE("a whole number that no double has is rounded, and has its range") {
+  Config config = Read("a = 9007199254740993\nb = [9223372036854775807]\n");
+  CHECK(config.Number("a") == 9007199254740992);
+  CHECK(config.Numbers("b", 1)[0] == 9223372036854775807.0);
+  CHECK_THROWS_WITH(config.Number("a", {1e-3, 10}), Catch::Contains("is not in"));
+  CHECK_THROWS_WITH(config.Numbers("b", 1, {1e-3, 10}), Catch::Contains("not in"));
+}
+
 TEST_CASE("every mistake is named with file, line and column") {
   Config config =
       Read("a = \"1.5\"\nb = -3\nc = 2.5\n[f]\ng = 1\n\n[[h]]\nx = 1\n[[h]]\nx = nan\n");

@@ -108,5 +108,38 @@ TEST_CASE_METHOD(Surroundings,
   CHECK_FALSE(Step());
 }
 
+TEST_CASE_METHOD(Surroundings,
+                 "a driver that was not heard for a while is none that has been disarmed") {
+  Driver(driver_status_t::ARMED);
+  controller.OnPolicy(Policy(0, 1, 0.5f));
+  StepUntil(S::RUNNING);
+  robot_state.valid = 0;
+  Step();
+  robot_state.valid = 1;
+  REQUIRE(controller.phase() == S::HALTED);
+  now += 1'500'000, utime += 1'500'000;
+  controller.Tick(now, utime);
+  Driver(driver_status_t::ARMED);
+  CHECK(controller.phase() == S::HALTED);
+  for (int i = 0; i < 100; ++i) CHECK_FALSE(Step());
+  Driver(driver_status_t::IDLE);
+  Driver(driver_status_t::ARMED);
+  StepUntil(S::COMPLETE);
+}
+
+TEST_CASE_METHOD(Surroundings, "after an episode that was aborted the newest policy runs") {
+  Driver(driver_status_t::ARMED);
+  controller.OnPolicy(Policy(0, 1, 0.5f));
+  StepUntil(S::RUNNING);
+  controller.OnPolicy(Policy(1, 1, 0.25f));
+  robot_state.valid = 0;
+  Step();
+  robot_state.valid = 1;
+  Driver(driver_status_t::FAULT);
+  Driver(driver_status_t::ARMED);
+  StepUntil(S::PLACING);
+  CHECK(controller.status().policy_iteration == 1);
+}
+
 }  // namespace
 }  // namespace plumb

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <chrono>
+#include <cmath>
 #include <iostream>
 #include <limits>
 #include <map>
@@ -62,6 +63,24 @@ TEST_CASE("what a model gets wrong is named, and a right model is left in peace"
     for (const Misfit& misfit : found.misfits) CHECK(misfit.condition != "free");
     CHECK(found.misfits[0].condition == "contact");
   }
+}
+
+TEST_CASE("what rests has no errors to compare, in contact or out of it") {
+  const RobotDescription robot = Robot("hopper");
+  FittedLog log(robot, RandomLog(robot, {}, 250, 3));
+  log.residuals.rollouts = log.rollouts;
+  log.residuals.rows = log.rows;
+  log.residuals.noise_known.assign(12, false);
+  for (size_t i = 0; i < log.rows.size(); ++i) {
+    if (log.rows[i].coordinate != 5) continue;
+    log.residuals.errors(static_cast<Eigen::Index>(i)) = 0;
+    log.residuals.jacobian.row(static_cast<Eigen::Index>(i)).setZero();
+  }
+  const ProjectedErrors errors(log.known, log.residuals);
+  REQUIRE(errors.conditions);
+  const std::vector<Misfit> tests = TestScale(errors, log.residuals.noise_known);
+  CHECK(tests.size() == 11);
+  for (const Misfit& test : tests) CHECK(std::isfinite(test.p));
 }
 
 TEST_CASE("how much larger a parameter would have to be is told") {

@@ -190,5 +190,11 @@ TEST_CASE("what is no calibration is refused") {
   CHECK_THROWS_AS(RunSbc(prior, tall, Marginals({"x"}), 1, 1), std::invalid_argument);
 }
 
+TEST_CASE("of too few posteriors nobody can tell") {
+  // All in the middle of 99 draws, with ten tests: of 13 posteriors, p is 0.0014.
+  CHECK(FewestPosteriors(99, 10) == 14);
+  CHECK(FewestPosteriors(99, 2) < FewestPosteriors(99, 100));
+}
+
 }  // namespace
 }  // namespace plumb
