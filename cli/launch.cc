@@ -107,7 +107,9 @@ class ClosedLoop {
     if (setting_.virtual_run) setting_.virtual_run->Finish();
     std::cout << progress_.Conclusion(setting_.truth);
     WriteOutcome();
-    return 0;
+    if (processes_.record_fault().empty()) return 0;
+    std::cerr << "plumb: " << processes_.record_fault();
+    return 1;
   }
 
  private:

@@ -1,5 +1,6 @@
 #include "cli/run_processes.h"
 
+#include <fmt/format.h>
 #include <signal.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
@@ -171,10 +172,19 @@ void RunProcesses::StopInRealTime() {
   }
   for (Child& child : children_) child.Signal(SIGTERM);
   const auto start = SteadyClock::now();
-  for (Child& child : children_) {
-    if (!child.WaitFor(std::max(0.0, 0.3 - SecondsSince(start)))) child.Signal(SIGKILL);
-  }
-  for (Child& child : children_) child.WaitFor(0.2);
+  const auto end = [&](bool records, double seconds) {
+    for (Child& child : children_) {
+      if ((child.name() == kRecorder) != records) continue;
+      if (!child.WaitFor(std::max(0.0, seconds - SecondsSince(start)))) child.Signal(SIGKILL);
+      child.WaitFor(0.2);
+      if (records && child.ending() != "exit status 0")
+        record_fault_ =
+            fmt::format("the record is not whole: {} ended ({}); the end of {}:\n{}", child.name(),
+                        child.ending(), child.log().string(), child.Tail(5));
+    }
+  };
+  end(false, 0.3);
+  end(true, 10);  // it commands nothing, and may have to wait for a slow disk
 }
 
 }  // namespace plumb

@@ -39,6 +39,9 @@ class RunProcesses {
   /// Motors first, the virtual robot last. Does not throw. @param hurry whatever they do: within
   /// six seconds, or one if a person waits. Otherwise, in virtual time, always in the same way.
   void Stop(bool hurry) noexcept;
+  /// Once they are stopped: why the record of a run in real time is not whole; empty if it is, or
+  /// there is none.
+  const std::string& record_fault() const { return record_fault_; }
   /// A person waits for the end.
   void Hurry() { patience_ = 0.5; }
 
@@ -54,6 +57,7 @@ class RunProcesses {
   Coordinator* coordinator_;
   double patience_ = 5;  // [s] of real time for the motors to be switched off in virtual time
   std::vector<Child> children_;
+  std::string record_fault_;
   std::optional<Child> dashboard_;  // looks on, in virtual time from outside
 };
 
