@@ -104,23 +104,22 @@ class CheckpointReader {
 };
 
 template <class Archive, class C>
+requires std::same_as<std::remove_const_t<C>, RunningMoments> ||
+    std::same_as<std::remove_const_t<C>, ObservationMoments>
+void Transfer(Archive& archive, C& moments) {
+  archive(moments.count);
+  archive(moments.mean);
+  archive(moments.squares);
+}
+
+template <class Archive, class C>
 requires std::same_as<std::remove_const_t<C>, CriticState>
 void Transfer(Archive& archive, C& critic) {
   archive(critic.parameters);
   archive(critic.first_moment);
   archive(critic.second_moment);
   archive(critic.adam_steps);
-  archive(critic.targets.count);
-  archive(critic.targets.mean);
-  archive(critic.targets.squares);
-}
-
-template <class Archive, class C>
-requires std::same_as<std::remove_const_t<C>, ObservationMoments>
-void Transfer(Archive& archive, C& observations) {
-  archive(observations.count);
-  archive(observations.mean);
-  archive(observations.squares);
+  Transfer(archive, critic.targets);
 }
 
 template <class Archive, class C>

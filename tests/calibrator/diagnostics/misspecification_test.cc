@@ -278,52 +278,6 @@ TEST_CASE("errors that are not finite are an alarm, and sizes have to fit") {
   CHECK_THROWS_AS(log.Find(), std::invalid_argument);
 }
 
-TEST_CASE("what a robot touches") {
-  const RobotDescription hopper = Robot("hopper");
-  Eigen::VectorXd q = Eigen::VectorXd::Zero(6);
-  q.tail(3) << -0.1, -0.1, 0.1;
-  q(1) = 1.25;
-  CHECK_FALSE(TouchFinder(hopper).Find(q).any());
-  q(1) = 1.15;
-  CHECK(TouchFinder(hopper).Find(q).ground);
-  CHECK_FALSE(TouchFinder(hopper).Find(q).stop);
-  q(1) = 2;
-  q(4) = 0.01;
-  CHECK(TouchFinder(hopper).Find(q).stop);
-  CHECK_FALSE(TouchFinder(hopper).Find(q).ground);
-  RobotDescription blind = hopper;
-  blind.simulation.stop.reset();
-  CHECK_FALSE(TouchFinder(blind).Find(q).any());
-  CHECK_THROWS_AS(TouchFinder(hopper).Find(q.head(5)), std::invalid_argument);
-}
-
-TEST_CASE("candidates are parameters of every robot's simulator, at the values that it has") {
-  for (const char* name : {"pendulum", "hopper", "cartpole", "double_pendulum"}) {
-    const RobotDescription robot = Robot(name);
-    const std::vector<Candidate> candidates = FindCandidates(robot);
-    REQUIRE(candidates.size() > 3);
-    const Model model(WithCandidates(robot, candidates));
-    Eigen::VectorXd own(robot.parameters.size());
-    for (size_t i = 0; i < robot.parameters.size(); ++i)
-      own(static_cast<Eigen::Index>(i)) = robot.parameters[i].mean;
-    Eigen::VectorXd all(own.size() + static_cast<Eigen::Index>(candidates.size()));
-    all << own, Eigen::VectorXd::NullaryExpr(
-                    static_cast<Eigen::Index>(candidates.size()),
-                    [&](Eigen::Index i) { return candidates[static_cast<size_t>(i)].value; });
-    Simulator with(WithCandidates(robot, candidates)), without(robot);
-    with.SetParameters(all);
-    without.SetParameters(own);
-    const Eigen::VectorXd q = Eigen::VectorXd::Constant(robot.num_positions(), 0.1);
-    const Eigen::VectorXd v = Eigen::VectorXd::Constant(robot.num_velocities(), -0.2);
-    for (Simulator* simulator : {&with, &without}) {
-      simulator->SetState(q, v);
-      simulator->Step(Eigen::VectorXd::Constant(v.size(), 0.3), 0.01);
-    }
-    INFO(name);
-    CHECK((with.v() - without.v()).norm() < 1e-6);
-  }
-}
-
 TEST_CASE("the alarm on logs of right and wrong models, measured", "[.slow]") {
   const RobotDescription robot = Robot("hopper");
   constexpr int kLogs = 20;
