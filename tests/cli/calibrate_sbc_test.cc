@@ -42,7 +42,7 @@ TEST_CASE(
   CHECK(enough.status == 0);
   CHECK(enough.text.find("calibrated") != std::string::npos);
   CHECK(enough.text.find("unknown") == std::string::npos);
-  if (Shell("command -v mpirun").status != 0) return;
+  if (!HasMpirun()) return;
   const Outcome ranks = Shell(Mpirun(2) + Plumb() + calibrate + "5");
   INFO(ranks.text);
   CHECK(ranks.status == 1);

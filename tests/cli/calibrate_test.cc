@@ -111,10 +111,7 @@ TEST_CASE("a journal is not taken up for a table that has been corrected since")
 }
 
 TEST_CASE("ranks that share the work come to the same bits") {
-  if (Shell("command -v mpirun").status != 0) {
-    WARN("skipped: mpirun (openmpi-bin) is not installed");
-    return;
-  }
+  if (!HasMpirun()) return;
   const TemporaryFolder folder;
   const std::string table = HopperTable(folder, 6);
   const std::string arguments =
@@ -127,10 +124,7 @@ TEST_CASE("ranks that share the work come to the same bits") {
 }
 
 TEST_CASE("a rank that is asked to stop does not let the others wait for it") {
-  if (Shell("command -v mpirun").status != 0) {
-    WARN("skipped: mpirun (openmpi-bin) is not installed");
-    return;
-  }
+  if (!HasMpirun()) return;
   const TemporaryFolder folder;
   const std::string one = Plumb() + "calibrate " + Robot("hopper") + " --csv " +
                           HopperTable(folder, 4) + " --method reps --threads 1 --output " +

@@ -210,10 +210,7 @@ TEST_CASE("a training that has not ended is not lost to another one") {
 TEST_CASE("ranks give the same bits as one process, file by file") {
   const TemporaryFolder folder;
   REQUIRE(Shell(Train(folder, "one", "--steps 12000 --threads 2")).status == 0);
-  if (Shell("command -v mpirun").status != 0) {
-    WARN("openmpi-bin is not installed: ranks are not tested");
-    return;
-  }
+  if (!HasMpirun()) return;
   const std::string mpirun = Mpirun(3);
   const Outcome begun = Shell(mpirun + Train(folder, "three", "--steps 6000 --threads 1"));
   INFO(begun.text);
