@@ -240,11 +240,11 @@ std::vector<std::string> Config::Strings(const std::string& key,
 }
 
 Config Config::Table(const std::string& key, bool required) {
-  static const toml::table kEmpty;
+  static const toml::table empty;
   const std::string path = path_.empty() ? key : path_ + "." + key;
   if (!Has(key)) {
     if (required) FailMissing(key);
-    return Config(root_, &kEmpty, file_, path);
+    return Config(root_, &empty, file_, path);
   }
   const toml::table* sub = table().get(key)->as_table();
   if (!sub) Fail(key, "is not a table");

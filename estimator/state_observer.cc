@@ -119,7 +119,8 @@ bool StateObserver::Displaced(const joint_state_t& measured) const {
   for (size_t i = 0; i < joints_.size(); ++i) {
     if (!IsNew(measured, i)) continue;
     const Joint& joint = joints_[i];
-    if (joint.used < 0 || joint.out) return true;  // there it is
+    if (joint.used < 0) return true;  // there it is
+    if (joint.out) continue;
     const auto innovation =
         joint.filter.Expect(Quantity::kPosition, measured.position[i], Age(measured, i));
     const double limit =
@@ -129,9 +130,20 @@ bool StateObserver::Displaced(const joint_state_t& measured) const {
   return false;
 }
 
-void StateObserver::Restart(const joint_state_t& measured) {
-  while (num_waiting_ > 0) EmitSmoothed();
+bool StateObserver::Back(const joint_state_t& measured) const {
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    if (joints_[i].out && IsNew(measured, i)) return true;
+  }
+  return false;
+}
+
+void StateObserver::RestartAll(const joint_state_t& measured) {
   if (base_) base_->Restart();
+  RestartJoints(measured);
+}
+
+void StateObserver::RestartJoints(const joint_state_t& measured) {
+  while (num_waiting_ > 0) EmitSmoothed();
   for (size_t i = 0; i < joints_.size(); ++i) {
     Joint& joint = joints_[i];
     const bool known = measured.valid[i];
@@ -261,18 +273,22 @@ bool StateObserver::OnJointState(const joint_state_t& measured) {
   }
   const int64_t elapsed = measured.utime - state_.utime;
   const bool jumped = started_ && (elapsed <= 0 || elapsed > kLongestGap);
-  bool restarted = !started_ || jumped;
-  if (!restarted) {
+  bool anew = !started_ || jumped, back = false;
+  if (!anew) {
     Predict(measured, Seconds(elapsed));
-    restarted = Displaced(measured);
+    anew = Displaced(measured);
+    back = Back(measured);
   }
   if (jumped) {
     for (Imu& imu : imus_) imu.inbox.Clear();
     for (Imu& imu : imus_) imu.used = -1;
     for (Joint& joint : joints_) joint.used = -1;
   }
-  if (restarted) {
-    Restart(measured);
+  bool restarted = anew || back;
+  if (anew) {
+    RestartAll(measured);
+  } else if (back) {
+    RestartJoints(measured);
   } else {
     ++since_restart_;
     for (size_t i = 0; i < joints_.size(); ++i) {
@@ -287,7 +303,7 @@ bool StateObserver::OnJointState(const joint_state_t& measured) {
   }
   const auto sound = [](const Joint& joint) { return joint.filter.sound(); };
   if (!restarted && (moved || !std::all_of(joints_.begin(), joints_.end(), sound))) {
-    Restart(measured);
+    RestartAll(measured);
     restarted = true;
   }
   for (size_t i = 0; i < joints_.size(); ++i) {

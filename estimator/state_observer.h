@@ -34,10 +34,11 @@ namespace plumb {
 /// predicted; after [estimator] outage the state is not valid until the joint is back.
 ///
 /// The filter restarts after a jump of time (backwards, or more than a second forwards), when a
-/// joint comes back after an outage, and when the robot has evidently been moved by hand
-/// (innovation above reset_after and all uncertainty); such a state says `restarted`. It is `valid`
-/// when all joints are, the filter has settled, all of its numbers are finite and quaternions are
-/// of unit length. A filter that is not finite restarts.
+/// joint comes back after an outage (all but a base without a boom, which its IMU has told of), and
+/// when the robot has evidently been moved by hand (innovation above reset_after and all
+/// uncertainty); such a state says `restarted`. It is `valid` when all joints are, the filter has
+/// settled, all of its numbers are finite and quaternions are of unit length. A filter that is not
+/// finite restarts.
 ///
 /// OnJointState and OnImu do not allocate after construction, but for strings in what they are
 /// given.
@@ -109,7 +110,10 @@ class StateObserver {
   bool IsNew(const joint_state_t& measured, size_t joint) const;
   double Age(const joint_state_t& measured, size_t joint) const;
   bool Displaced(const joint_state_t& measured) const;
-  void Restart(const joint_state_t& measured);
+  bool Back(const joint_state_t& measured) const;
+  void RestartAll(const joint_state_t& measured);
+  // A leg that was silent says nothing against what its base has felt meanwhile.
+  void RestartJoints(const joint_state_t& measured);
   double FindEffortSteps(const joint_state_t& measured);
   void Predict(const joint_state_t& measured, double elapsed);
   void UseReading(const joint_state_t& measured, size_t joint);
