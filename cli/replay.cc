@@ -59,14 +59,22 @@ class DriverWatch {
   std::unique_ptr<Messenger::Subscription> subscription_;  // ends first
 };
 
+/// Asked to stop before anything was said.
+struct Stopped {};
+
 class Replayer {
  public:
   Replayer(Process& process, const ReplayFlags& flags)
       : process_(process),
         from_(flags.part.from),
-        player_(flags.log, flags.part, flags.speed, Now()),
+        player_(flags.log, flags.part, flags.speed, Now(),
+                [&](double share) {
+                  if (process_.stopping()) throw Stopped();
+                  line_.Show("looking through " + flags.log, share);
+                }),
         messenger_(process.messenger()),
         drivers_(messenger_) {
+    line_.Clear();
     const std::string& url = process.lcm_url();
     if (url.starts_with("udpm:")) {
       pacing_.emplace(
@@ -192,13 +200,13 @@ class Replayer {
   }
 
   Process& process_;
+  ProgressLine line_{true, std::cout};
   const double from_;
   LogPlayer player_;
   Messenger& messenger_;
   DriverWatch drivers_;
   Keyboard keyboard_;
   std::optional<Pacing> pacing_;  // only UDP needs it
-  ProgressLine line_{true, std::cout};
   int64_t said_ = 0, shown_ = 0;
   bool full_ = false;  // a listener's buffer
   int still_ = 0;      // listeners that take nothing
@@ -221,7 +229,11 @@ int Replay(Process& process, const ReplayFlags& flags) {
     lock.emplace("messages " + LcmGroup(url),
                  "a run or a replay is under way on " + url + ": stop it, or give --lcm-url");
   }
-  return Replayer(process, flags).Run();
+  try {
+    return Replayer(process, flags).Run();
+  } catch (const Stopped&) {
+    return 130;
+  }
 }
 
 }  // namespace plumb

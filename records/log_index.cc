@@ -1,6 +1,7 @@
 #include "records/log_index.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <limits>
 #include <stdexcept>
 
@@ -11,11 +12,15 @@ constexpr int64_t kBetweenPlaces = 1000;  // messages
 
 }  // namespace
 
-LogIndex::LogIndex(LcmLogReader& log) {
+LogIndex::LogIndex(LcmLogReader& log, const std::function<void(double)>& progress) {
+  const auto size = static_cast<double>(std::filesystem::file_size(log.file()));
   log.Seek(0);
   int64_t latest = std::numeric_limits<int64_t>::min(), utime = 0;
   for (;;) {
-    if (messages_ % kBetweenPlaces == 0) places_.push_back({log.position(), latest});
+    if (messages_ % kBetweenPlaces == 0) {
+      places_.push_back({log.position(), latest});
+      if (progress) progress(std::min(1., static_cast<double>(log.position()) / size));
+    }
     if (!log.Skip(utime)) break;
     if (messages_++ == 0) begin_ = utime;
     latest = std::max(latest, utime);

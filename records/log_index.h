@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "common/lcm_log_reader.h"
@@ -12,8 +13,9 @@ namespace plumb {
 class LogIndex {
  public:
   /// Reads the whole log once, its messages apart, and leaves the reader at its beginning.
+  /// @param progress told the share that is done; may throw to break off.
   /// @throws std::runtime_error naming the file if it is damaged, or has no message.
-  explicit LogIndex(LcmLogReader& log);
+  explicit LogIndex(LcmLogReader& log, const std::function<void(double)>& progress = {});
 
   int64_t begin() const { return begin_; }  ///< [us] time of the first message
   int64_t end() const { return end_; }      ///< [us] the latest time

@@ -13,8 +13,9 @@ constexpr double kForever = 1e15;  // [us]; what a hostile log has between two m
 
 }  // namespace
 
-LogPlayer::LogPlayer(const std::string& file, const Part& part, double speed, int64_t now)
-    : log_(file), index_(log_), part_(part), speed_(speed), since_(now) {
+LogPlayer::LogPlayer(const std::string& file, const Part& part, double speed, int64_t now,
+                     const std::function<void(double)>& progress)
+    : log_(file), index_(log_, progress), part_(part), speed_(speed), since_(now) {
   Seek(part_.from, now);
   if (over_) {
     const std::string to = part_.to < kToTheEnd ? fmt::format(" to {:g} s", part_.to) : "";

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <string>
 
@@ -21,10 +22,11 @@ class LogPlayer {
   };
 
   /// Begins with the part's first message. @param speed of the log's time against `now`'s, >= 0; 0
-  /// = every message is due at once.
+  /// = every message is due at once. @param progress of looking through the file, as LogIndex's.
   /// @throws std::runtime_error naming the file if it cannot be read, is damaged, or has no message
   /// in the part.
-  LogPlayer(const std::string& file, const Part& part, double speed, int64_t now);
+  LogPlayer(const std::string& file, const Part& part, double speed, int64_t now,
+            const std::function<void(double)>& progress = {});
 
   const LogIndex& index() const { return index_; }
   double duration() const { return At(index_.end()); }

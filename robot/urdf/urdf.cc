@@ -267,6 +267,7 @@ std::vector<std::string> UrdfModel::LoadCollisionMeshes() {
     links[static_cast<size_t>(one.link)].collisions.push_back(std::move(shape));
   }
   std::vector<std::string> files;
+  files.reserve(points_of.size());
   for (const auto& [path, points] : points_of) files.push_back(path);
   return files;
 }

@@ -46,6 +46,23 @@ TEST_CASE_METHOD(TenSeconds, "each message is due at its time, at any speed") {
   CHECK(player.Position(1000 + 40'000) == Approx(10));
 }
 
+TEST_CASE("who waits for a long log is told how far it is, and may break off") {
+  const TemporaryFolder folder;
+  WriteLog(folder / "a.lcmlog", std::vector<int64_t>(3500, kFirst));
+  std::vector<double> shares;
+  const auto told = [&](double share) { shares.push_back(share); };
+  CHECK(LogPlayer(folder / "a.lcmlog", {}, 1, 0, told).index().messages() == 3500);
+  REQUIRE(shares.size() == 4);
+  CHECK(shares.front() == 0);
+  CHECK(shares.back() == Approx(3000. / 3500).margin(0.01));
+  CHECK(std::ranges::is_sorted(shares));
+  struct Stopped {};
+  const auto stop = [](double share) {
+    if (share > 0.5) throw Stopped();
+  };
+  CHECK_THROWS_AS(LogPlayer(folder / "a.lcmlog", {}, 1, 0, stop), Stopped);
+}
+
 TEST_CASE_METHOD(TenSeconds, "a pause lasts until it ends, and nothing is skipped by it") {
   LogPlayer player(file, {}, 1, 0);
   player.Advance(0);
