@@ -29,7 +29,7 @@ constexpr int64_t kReopenPeriod = 100'000;  // [us]
 constexpr double kDisarmTimeout = 0.3;
 // of frames per wake: a flood must not keep us from our deadlines
 constexpr int kBursts = 8;
-constexpr int64_t kFlight = kFlightSeconds * 1'000'000;  // [us]
+constexpr int64_t kFlight = int64_t{kFlightSeconds} * 1'000'000;  // [us]
 
 void WriteState(int8_t state, std::string_view reason) {
   constexpr std::array kNames = {"ABSENT", "IDLE", "ARMING", "ARMED", "FAULT"};

@@ -12,7 +12,7 @@ namespace plumb {
 namespace {
 
 // of a bus: more than two of 1 Mbit/s carry in that time
-constexpr size_t kFlightFrames = kFlightSeconds * 20'000;
+constexpr size_t kFlightFrames = size_t{kFlightSeconds} * 20'000;
 
 void ReportFlight(const std::string& file, const std::string& error) {
   if (error.empty())

@@ -41,20 +41,46 @@ std::vector<NoiseDescription> NoiseOf(const RobotDescription& robot) {
   return noise;
 }
 
-}  // namespace
+class NoiseSearch {
+ public:
+  NoiseSearch(const RobotDescription& robot, const std::function<void(StateObserver&)>& play)
+      : robot_(robot), play_(play), tried_(robot), has_velocity_(robot.joints.size(), false) {}
 
-TunedNoise TuneNoise(const RobotDescription& robot,
-                     const std::function<void(StateObserver&)>& play) {
-  const auto n = static_cast<size_t>(robot.num_joints());
-  RobotDescription tried = robot;
-  std::vector<bool> has_velocity(n, false);
-  const auto deviances = [&](const std::vector<NoiseDescription>& noise) {
-    for (size_t i = 0; i < n; ++i) tried.joints[i].noise = noise[i];
-    StateObserver observer(tried);
-    play(observer);
+  TunedNoise Find() {
+    const std::vector<NoiseDescription> given = NoiseOf(robot_);
+    tuned_.joints = given;
+    tuned_.before = Deviances(given);
+    for (const Parameter impact : kImpacts) {
+      for (NoiseDescription& joint : tuned_.joints) {
+        if (joint.*impact == 0) joint.*impact = kFirstImpact;
+      }
+    }
+    tuned_.after = Deviances(tuned_.joints);
+    for (const double factor : kFactors) {
+      for (int round = 0; round < kRounds && Step(factor); ++round) {
+      }
+    }
+    for (const Parameter impact : kImpacts) LeaveOut(impact, given);
+    for (size_t i = 0; i < size(); ++i) {
+      constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+      if (robot_.joints[i].passive) tuned_.joints[i].coupling = kNone;
+      if (!has_velocity_[i]) tuned_.joints[i].velocity_sd = kNone;
+      tuned_.joints[i].delay = robot_.joints[i].noise.delay;
+    }
+    return std::move(tuned_);
+  }
+
+ private:
+  size_t size() const { return robot_.joints.size(); }
+
+  // Per reading of each joint.
+  std::vector<double> Deviances(const std::vector<NoiseDescription>& noise) {
+    for (size_t i = 0; i < size(); ++i) tried_.joints[i].noise = noise[i];
+    StateObserver observer(tried_);
+    play_(observer);
     const estimator_status_t status = observer.Status();
     std::vector<double> per_reading;
-    for (size_t i = 0; i < n; ++i) {
+    for (size_t i = 0; i < size(); ++i) {
       const int64_t readings = observer.readings(static_cast<int>(i));
       // nothing to learn: no trial is better than another
       if (observer.of_base(static_cast<int>(i))) {
@@ -64,67 +90,66 @@ TunedNoise TuneNoise(const RobotDescription& robot,
       if (readings < kFewest) {
         throw std::invalid_argument(
             fmt::format("joint {}: {} readings are too few to learn noise from: at least {}",
-                        robot.joints[i].name, readings, kFewest));
+                        robot_.joints[i].name, readings, kFewest));
       }
-      has_velocity[i] = std::isfinite(status.velocity_nis[i]);
+      has_velocity_[i] = std::isfinite(status.velocity_nis[i]);
       per_reading.push_back(observer.deviance(static_cast<int>(i)) / static_cast<double>(readings));
     }
     return per_reading;
-  };
-
-  TunedNoise tuned;
-  tuned.joints = NoiseOf(robot);
-  tuned.before = deviances(tuned.joints);
-  const std::vector<NoiseDescription> given = tuned.joints;
-  for (const Parameter impact : kImpacts) {
-    for (NoiseDescription& joint : tuned.joints) {
-      if (joint.*impact == 0) joint.*impact = kFirstImpact;
-    }
   }
-  tuned.after = deviances(tuned.joints);
-  for (const double factor : kFactors) {
-    bool better = true;
-    for (int round = 0; better && round < kRounds; ++round) {
-      better = false;
-      for (const Parameter parameter : kParameters) {
-        std::vector<bool> found(n, false);
-        for (const double step : {factor, 1 / factor}) {
-          std::vector<NoiseDescription> candidate = tuned.joints;
-          for (size_t i = 0; i < n; ++i) {
-            if (!found[i]) candidate[i].*parameter *= step;
-            candidate[i].coupling = std::min(1.0, candidate[i].coupling);
-          }
-          const std::vector<double> deviance = deviances(candidate);
-          for (size_t i = 0; i < n; ++i) {
-            if (found[i] || !(deviance[i] < tuned.after[i] - kWorthwhile)) continue;
-            found[i] = better = true;
-            tuned.joints[i] = candidate[i];
-            tuned.after[i] = deviance[i];
-          }
+
+  // Each parameter by a factor, up or down, of each joint by itself. @return whether any is better.
+  bool Step(double factor) {
+    bool better = false;
+    for (const Parameter parameter : kParameters) {
+      std::vector<bool> found(size(), false);
+      for (const double step : {factor, 1 / factor}) {
+        std::vector<NoiseDescription> candidate = tuned_.joints;
+        for (size_t i = 0; i < size(); ++i) {
+          if (!found[i]) candidate[i].*parameter *= step;
+          candidate[i].coupling = std::min(1.0, candidate[i].coupling);
+        }
+        const std::vector<double> deviance = Deviances(candidate);
+        for (size_t i = 0; i < size(); ++i) {
+          if (found[i] || !(deviance[i] < tuned_.after[i] - kWorthwhile)) continue;
+          found[i] = better = true;
+          Take(i, candidate, deviance);
         }
       }
     }
+    return better;
   }
+
   // A kind of noise that was absent and is not worth having stays absent.
-  for (const Parameter impact : kImpacts) {
-    std::vector<NoiseDescription> candidate = tuned.joints;
-    for (size_t i = 0; i < n; ++i) {
+  void LeaveOut(Parameter impact, const std::vector<NoiseDescription>& given) {
+    std::vector<NoiseDescription> candidate = tuned_.joints;
+    for (size_t i = 0; i < size(); ++i) {
       if (given[i].*impact == 0) candidate[i].*impact = 0;
     }
-    const std::vector<double> deviance = deviances(candidate);
-    for (size_t i = 0; i < n; ++i) {
-      if (!(deviance[i] < tuned.after[i] + kWorthwhile)) continue;
-      tuned.joints[i] = candidate[i];
-      tuned.after[i] = deviance[i];
+    const std::vector<double> deviance = Deviances(candidate);
+    for (size_t i = 0; i < size(); ++i) {
+      if (deviance[i] < tuned_.after[i] + kWorthwhile) Take(i, candidate, deviance);
     }
   }
-  for (size_t i = 0; i < n; ++i) {
-    if (robot.joints[i].passive)
-      tuned.joints[i].coupling = std::numeric_limits<double>::quiet_NaN();
-    if (!has_velocity[i]) tuned.joints[i].velocity_sd = std::numeric_limits<double>::quiet_NaN();
-    tuned.joints[i].delay = robot.joints[i].noise.delay;
+
+  void Take(size_t joint, const std::vector<NoiseDescription>& candidate,
+            const std::vector<double>& deviance) {
+    tuned_.joints[joint] = candidate[joint];
+    tuned_.after[joint] = deviance[joint];
   }
-  return tuned;
+
+  const RobotDescription& robot_;
+  const std::function<void(StateObserver&)>& play_;
+  RobotDescription tried_;
+  std::vector<bool> has_velocity_;
+  TunedNoise tuned_;
+};
+
+}  // namespace
+
+TunedNoise TuneNoise(const RobotDescription& robot,
+                     const std::function<void(StateObserver&)>& play) {
+  return NoiseSearch(robot, play).Find();
 }
 
 }  // namespace plumb

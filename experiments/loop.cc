@@ -91,79 +91,114 @@ std::unique_ptr<Trainer> Loop::TrainFirst(const std::string& name,
   return trainer;
 }
 
+/// One run of the loop, from the first policy to the judgement of the last.
+class Loop::Running {
+ public:
+  Running(Loop& loop, RealSystem& real, const LoopSettings& settings,
+          const std::function<void(double)>& progress)
+      : real_(real), settings_(settings), calibrated_(loop.model_), acceptance_(steps()) {
+    distribution_ = FirstDistribution(settings.strategy, loop.model_, loop.truth_);
+    calibrated_.calibration.residual &= settings.residual;
+    if (Learns(settings.strategy))
+      simopt_ = MakeSimOpt(settings.strategy, calibrated_, settings.seed, settings.threads);
+    const double all = settings.first_updates + settings.iterations * settings.next_updates;
+    const double first = settings.first_updates / all, next = settings.next_updates / all;
+    told_ = [=](int iteration, double share) { progress(first + next * (iteration + share)); };
+    const auto begins = simopt_ ? CalibrationStrategy::kPrior : settings.strategy;
+    trainer_ = loop.TrainFirst(Key(begins), distribution_, settings,
+                               [=](double share) { progress(first * share); });
+    if (settings.forces > 0)
+      distribution_.residual = RandomForces(loop.model_, settings.forces, settings.seed);
+  }
+
+  LoopResult Run() {
+    for (int iteration = 0;; ++iteration) {
+      Judge(iteration);
+      if (iteration == settings_.iterations) break;
+      if (simopt_ || settings_.accept) {
+        RollOut(iteration);
+        if (simopt_) Calibrate();
+        if (settings_.accept) Choose(iteration);
+      }
+      Train(*trainer_, sample_, settings_.next_updates,
+            [&](double share) { told_(iteration, share); });
+    }
+    if (simopt_) result_.rollouts = simopt_->state().rollouts;
+    return std::move(result_);
+  }
+
+ private:
+  int steps() const { return calibrated_.task.steps; }
+
+  void Judge(int iteration) {
+    judged_.push_back(
+        Loop::Judge(real_, trainer_->policy(), steps(), settings_.evaluation_episodes));
+    if (!settings_.accept) deployed_ = iteration;
+    const Judgement& deployed = judged_[static_cast<size_t>(deployed_)];
+    result_.rows.push_back({iteration, deployed.mean, deployed.worst, judged_.back().mean,
+                            deployed_,
+                            trainer_->EvaluateHeldOut(sample_, settings_.evaluation_episodes).mean,
+                            discrepancy_, distribution_.residual != nullptr, transitions_, seconds_,
+                            distribution_.Mean(), distribution_.Sd()});
+  }
+
+  void RollOut(int iteration) {
+    const int all = settings_.steps_per_iteration;
+    Use use = UseRobot(real_, trainer_->policy(), all,
+                       static_cast<int>(settings_.trial_share * all), iteration);
+    seconds_ += use.seconds;
+    transitions_ += static_cast<int64_t>(CountTransitions(use.rollouts));
+    for (const Trial& trial : use.trials) acceptance_.Add(iteration, trial);
+    if (simopt_) simopt_->Begin(std::move(use.rollouts));
+  }
+
+  void Calibrate() {
+    std::optional<CalibrationReport> report;
+    while (!(report = simopt_->Update())) {
+    }
+    discrepancy_ = report->discrepancy;
+    distribution_ = DistributionOf(*simopt_, calibrated_);
+    for (Gaussian& component : distribution_.mixture.components)
+      component.covariance *= settings_.tempering;
+  }
+
+  // Which policy is deployed from now on.
+  void Choose(int iteration) {
+    const bool right = simopt_ && calibrated_.calibration.residual && !simopt_->state().residual;
+    const double scatter = trainer_->ScatterOfStarts(distribution_.Mean());
+    if (!incumbent_) incumbent_ = trainer_->policy();
+    const auto simulated = [&](const GaussianPolicy& policy) {
+      return trainer_->EvaluateHeldOut(policy, sample_, Acceptance::kSimulators).mean;
+    };
+    const Acceptance::Decision decision =
+        right ? acceptance_.Trust(iteration, scatter)
+              : acceptance_.Decide(iteration, scatter,
+                                   {simulated(trainer_->policy()), simulated(*incumbent_)});
+    result_.decisions.push_back(Summary(decision));
+    if (acceptance_.incumbent() == iteration)
+      deployed_ = iteration, incumbent_ = trainer_->policy();
+  }
+
+  RealSystem& real_;
+  const LoopSettings& settings_;
+  RobotDescription calibrated_;
+  std::unique_ptr<SimOpt> simopt_;  // null: nothing is learnt of the robot
+  ParameterDistribution distribution_;
+  const ParameterSampler sample_ = [this](Random& random) { return distribution_.Draw(random); };
+  std::unique_ptr<Trainer> trainer_;
+  std::function<void(int, double)> told_;
+  Acceptance acceptance_;
+  std::optional<GaussianPolicy> incumbent_;
+  int deployed_ = 0;               // the iteration whose policy that is
+  std::vector<Judgement> judged_;  // each iteration's policy
+  int64_t transitions_ = 0;
+  double seconds_ = 0, discrepancy_ = std::numeric_limits<double>::quiet_NaN();
+  LoopResult result_;
+};
+
 LoopResult Loop::Run(RealSystem& real, const LoopSettings& settings,
                      const std::function<void(double)>& progress) {
-  ParameterDistribution distribution = FirstDistribution(settings.strategy, model_, truth_);
-  RobotDescription calibrated = model_;
-  calibrated.calibration.residual = model_.calibration.residual && settings.residual;
-  const std::unique_ptr<SimOpt> simopt =
-      Learns(settings.strategy)
-          ? MakeSimOpt(settings.strategy, calibrated, settings.seed, settings.threads)
-          : nullptr;
-  const double all = settings.first_updates + settings.iterations * settings.next_updates;
-  const double first = settings.first_updates / all, next = settings.next_updates / all;
-  const std::unique_ptr<Trainer> trainer = TrainFirst(
-      Learns(settings.strategy) ? Key(CalibrationStrategy::kPrior) : Key(settings.strategy),
-      distribution, settings, [&](double share) { progress(first * share); });
-  if (settings.forces > 0)
-    distribution.residual = RandomForces(model_, settings.forces, settings.seed);
-  const ParameterSampler sample = [&](Random& random) { return distribution.Draw(random); };
-  LoopResult result;
-  Acceptance acceptance(model_.task.steps);
-  std::optional<GaussianPolicy> incumbent;
-  int deployed_iteration = 0;
-  int64_t transitions = 0;
-  double seconds = 0, discrepancy = std::numeric_limits<double>::quiet_NaN();
-  std::vector<Judgement> judged;  // of each iteration's policy
-  for (int iteration = 0;; ++iteration) {
-    judged.push_back(
-        Judge(real, trainer->policy(), model_.task.steps, settings.evaluation_episodes));
-    if (!settings.accept) deployed_iteration = iteration;
-    const Judgement& deployed = judged[static_cast<size_t>(deployed_iteration)];
-    result.rows.push_back({iteration, deployed.mean, deployed.worst, judged.back().mean,
-                           deployed_iteration,
-                           trainer->EvaluateHeldOut(sample, settings.evaluation_episodes).mean,
-                           discrepancy, distribution.residual != nullptr, transitions, seconds,
-                           distribution.Mean(), distribution.Sd()});
-    if (iteration == settings.iterations) break;
-    if (simopt || settings.accept) {
-      const int steps = settings.steps_per_iteration;
-      Use use = UseRobot(real, trainer->policy(), steps,
-                         static_cast<int>(settings.trial_share * steps), iteration);
-      seconds += use.seconds;
-      transitions += static_cast<int64_t>(CountTransitions(use.rollouts));
-      for (const Trial& trial : use.trials) acceptance.Add(iteration, trial);
-      if (simopt) {
-        simopt->Begin(std::move(use.rollouts));
-        std::optional<CalibrationReport> report;
-        while (!(report = simopt->Update())) {
-        }
-        discrepancy = report->discrepancy;
-        distribution = DistributionOf(*simopt, model_);
-        for (Gaussian& component : distribution.mixture.components)
-          component.covariance *= settings.tempering;
-      }
-      if (settings.accept) {
-        const bool right = simopt && calibrated.calibration.residual && !simopt->state().residual;
-        const double scatter = trainer->ScatterOfStarts(distribution.Mean());
-        if (!incumbent) incumbent = trainer->policy();
-        const auto simulated = [&](const GaussianPolicy& policy) {
-          return trainer->EvaluateHeldOut(policy, sample, Acceptance::kSimulators).mean;
-        };
-        const Acceptance::Decision decision =
-            right ? acceptance.Trust(iteration, scatter)
-                  : acceptance.Decide(iteration, scatter,
-                                      {simulated(trainer->policy()), simulated(*incumbent)});
-        result.decisions.push_back(Summary(decision));
-        if (acceptance.incumbent() == iteration)
-          deployed_iteration = iteration, incumbent = trainer->policy();
-      }
-    }
-    Train(*trainer, sample, settings.next_updates,
-          [&](double share) { progress(first + next * (iteration + share)); });
-  }
-  if (simopt) result.rollouts = simopt->state().rollouts;
-  return result;
+  return Running(*this, real, settings, progress).Run();
 }
 
 Loop::Judgement Loop::Judge(RealSystem& real, const GaussianPolicy& policy, int steps,

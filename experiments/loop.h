@@ -93,6 +93,8 @@ class Loop {
   const RobotDescription& model() const { return model_; }
 
  private:
+  class Running;
+
   std::unique_ptr<Trainer> MakeTrainer(const LoopSettings& settings) const;
 
   RobotDescription model_;

@@ -27,6 +27,19 @@ struct Population {
 
 // All simulations of a generation, and which of them were accepted.
 struct Generation {
+  Generation(Index num_parameters, Index num_outcomes)
+      : u(num_parameters, 0), outcomes(num_outcomes, 0) {}
+
+  void Add(const MatrixXd& more_u, const MatrixXd& more_outcomes) {
+    u.conservativeResize(Eigen::NoChange, u.cols() + more_u.cols());
+    outcomes.conservativeResize(Eigen::NoChange, u.cols());
+    u.rightCols(more_u.cols()) = more_u;
+    outcomes.rightCols(more_u.cols()) = more_outcomes;
+  }
+  double acceptance() const {
+    return static_cast<double>(accepted.size()) / static_cast<double>(u.cols());
+  }
+
   MatrixXd u, outcomes;
   std::vector<Index> accepted;
 };
@@ -80,6 +93,97 @@ double Quantile(VectorXd values, double share) {
   return values(std::clamp<Index>(rank - 1, 0, values.size() - 1));
 }
 
+class Smc {
+ public:
+  Smc(const Problem& problem, const SmcOptions& options, uint64_t seed)
+      : problem_(problem), options_(options), seed_(seed) {}
+
+  Posterior Infer() {
+    for (uint32_t t = 0; simulations_ < options_.simulations; ++t) {
+      const Generation generation = Propose(t);
+      const auto accepted = static_cast<int>(generation.accepted.size());
+      // Half a generation is still one, and the only one there may ever be.
+      if (accepted < 2 || (t > 0 && accepted < options_.population / 2)) break;
+      Succeed(generation);
+      if (generation.acceptance() < options_.min_acceptance || !Narrow()) break;
+    }
+    Random random(seed_, {kSmcPosteriorStream});
+    Posterior posterior = AbcPosterior(problem_.prior, Kept(), options_.samples, random);
+    posterior.simulations = simulations_;
+    posterior.failures = failures_;
+    return posterior;
+  }
+  const SmcDiagnostics& diagnostics() const { return diagnostics_; }
+
+ private:
+  bool first() const { return kernels_.components.empty(); }
+
+  // Simulates until as many are accepted as a population has.
+  Generation Propose(uint32_t t) {
+    const auto full = static_cast<size_t>(options_.population);
+    Generation generation(problem_.prior.size(), problem_.observed.size());
+    Random random(seed_, {kSmcProposals, t});
+    while (generation.accepted.size() < full && simulations_ < options_.simulations) {
+      const Index batch = std::min<Index>(options_.population, options_.simulations - simulations_);
+      const MatrixXd u = first() ? StandardNormals(problem_.prior.size(), batch, random)
+                                 : Sample(kernels_, batch, random);
+      const MatrixXd outcomes = problem_.simulate(problem_.prior.FromStandard(u), simulations_);
+      const Index before = generation.u.cols();
+      generation.Add(u, outcomes);
+      const VectorXd d = Distances(options_.distance, outcomes, problem_.observed,
+                                   first() ? VectorXd::Ones(problem_.observed.size()) : scale_);
+      for (Index j = 0; j < batch; ++j) {
+        failures_ += !outcomes.col(j).allFinite();
+        if (d(j) <= epsilon_ && generation.accepted.size() < full)
+          generation.accepted.push_back(before + j);
+      }
+      simulations_ += batch;
+    }
+    return generation;
+  }
+
+  // The accepted ones are the population.
+  void Succeed(const Generation& generation) {
+    const auto accepted = static_cast<Index>(generation.accepted.size());
+    population_.u = generation.u(Eigen::all, generation.accepted);
+    population_.outcomes = generation.outcomes(Eigen::all, generation.accepted);
+    population_.weights = first() ? VectorXd::Constant(accepted, 1. / static_cast<double>(accepted))
+                                  : ImportanceWeights(population_.u, kernels_);
+    diagnostics_.generations.push_back({epsilon_, generation.u.cols(), static_cast<int>(accepted),
+                                        1 / population_.weights.squaredNorm()});
+    scale_ = RobustScale(generation.outcomes, problem_.observed);
+    distances_ = Distances(options_.distance, population_.outcomes, problem_.observed, scale_);
+  }
+
+  // The next epsilon, and the kernels to draw from. A change of scale changes the unit of epsilon,
+  // too: compared is the quantile with the largest distance now. @return false if it hardly falls.
+  bool Narrow() {
+    const double next = Quantile(distances_, options_.quantile);
+    if (!(next < (1 - options_.min_change) * distances_.maxCoeff())) return false;
+    epsilon_ = next;
+    kernels_ = Kernels(population_, options_.local_kernels);
+    return true;
+  }
+
+  std::optional<AdjustedSamples> Kept() const {
+    if (population_.u.cols() == 0) return std::nullopt;
+    if (!options_.adjust) return AdjustedSamples{population_.u, population_.weights};
+    return AdjustByRegression(population_.u, population_.outcomes, problem_.observed, distances_,
+                              population_.weights);
+  }
+
+  const Problem& problem_;
+  const SmcOptions& options_;
+  const uint64_t seed_;
+  int64_t simulations_ = 0, failures_ = 0;
+  Population population_;
+  GaussianMixture kernels_;
+  VectorXd scale_, distances_;  // the scale now in use; the population's distances by it
+  // The first generation accepts everything that did not fail.
+  double epsilon_ = std::numeric_limits<double>::max();
+  SmcDiagnostics diagnostics_;
+};
+
 }  // namespace
 
 Posterior InferBySmc(const Problem& problem, const SmcOptions& options, uint64_t seed,
@@ -89,76 +193,9 @@ Posterior InferBySmc(const Problem& problem, const SmcOptions& options, uint64_t
     throw std::invalid_argument(
         "SMC needs simulations, a population, samples, a quantile in (0, 1), an observation");
   }
-  const Index n = problem.prior.size();
-  const VectorXd& observed = problem.observed;
-  int64_t simulations = 0, failures = 0;
-  SmcDiagnostics report;
-  Population population;
-  GaussianMixture kernels;
-  VectorXd scale, distances;  // the scale now in use; the population's distances by it
-  // The first generation accepts everything that did not fail.
-  double epsilon = std::numeric_limits<double>::max();
-
-  for (uint32_t t = 0; simulations < options.simulations; ++t) {
-    Generation generation{MatrixXd(n, 0), MatrixXd(observed.size(), 0), {}};
-    Random random(seed, {kSmcProposals, t});
-    while (static_cast<int>(generation.accepted.size()) < options.population &&
-           simulations < options.simulations) {
-      const Index batch = std::min<Index>(options.population, options.simulations - simulations);
-      const MatrixXd u =
-          t == 0 ? StandardNormals(n, batch, random) : Sample(kernels, batch, random);
-      const MatrixXd outcomes = problem.simulate(problem.prior.FromStandard(u), simulations);
-      const Index before = generation.u.cols();
-      generation.u.conservativeResize(Eigen::NoChange, before + batch);
-      generation.outcomes.conservativeResize(Eigen::NoChange, before + batch);
-      generation.u.rightCols(batch) = u;
-      generation.outcomes.rightCols(batch) = outcomes;
-      const VectorXd d = Distances(options.distance, outcomes, observed,
-                                   t == 0 ? VectorXd::Ones(observed.size()) : scale);
-      for (Index j = 0; j < batch; ++j) {
-        failures += !outcomes.col(j).allFinite();
-        if (d(j) <= epsilon && static_cast<int>(generation.accepted.size()) < options.population) {
-          generation.accepted.push_back(before + j);
-        }
-      }
-      simulations += batch;
-    }
-    const auto accepted = static_cast<int>(generation.accepted.size());
-    // Half a generation is still one, and the only one there may ever be.
-    if (accepted < 2 || (t > 0 && accepted < options.population / 2)) break;
-
-    const MatrixXd u = generation.u(Eigen::all, generation.accepted);
-    const VectorXd weights =
-        t == 0 ? VectorXd::Constant(accepted, 1. / accepted) : ImportanceWeights(u, kernels);
-    population = {u, generation.outcomes(Eigen::all, generation.accepted), weights};
-    report.generations.push_back(
-        {epsilon, generation.u.cols(), accepted, 1 / weights.squaredNorm()});
-    scale = RobustScale(generation.outcomes, observed);
-    distances = Distances(options.distance, population.outcomes, observed, scale);
-    const double next = Quantile(distances, options.quantile);
-    // A change of scale changes the unit of epsilon, too: compared is the quantile with the largest
-    // distance now.
-    const double acceptance =
-        static_cast<double>(accepted) / static_cast<double>(generation.u.cols());
-    if (acceptance < options.min_acceptance ||
-        !(next < (1 - options.min_change) * distances.maxCoeff()))
-      break;
-    epsilon = next;
-    kernels = Kernels(population, options.local_kernels);
-  }
-
-  std::optional<AdjustedSamples> kept;
-  if (population.u.cols() > 0 && options.adjust) {
-    kept = AdjustByRegression(population.u, population.outcomes, observed, distances,
-                              population.weights);
-  } else if (population.u.cols() > 0) {
-    kept = {population.u, population.weights};
-  }
-  Random random(seed, {kSmcPosteriorStream});
-  Posterior posterior = AbcPosterior(problem.prior, kept, options.samples, random);
-  posterior.simulations = simulations;
-  posterior.failures = failures;
-  if (diagnostics) *diagnostics = std::move(report);
+  Smc smc(problem, options, seed);
+  Posterior posterior = smc.Infer();
+  if (diagnostics) *diagnostics = smc.diagnostics();
   return posterior;
 }
 
