@@ -29,8 +29,7 @@ std::string MethodHelp();
 /// `plumb calibrate`: infers from logs which simulators could have produced the robot's motion,
 /// writes the posterior, and summarises it for people. With mpirun its ranks share the work. An
 /// interrupted run leaves a journal beside the output, from which the same command goes on. @return
-/// exit status: 0, 130 if it was interrupted; with `strict` 3 if the posterior predicts no better
-/// than the prior, the model cannot explain the logs, or they do not agree.
+/// exit status: 0, 130 if it was interrupted; with `strict` 3 if the findings are not Trustworthy.
 /// @throws std::invalid_argument or std::runtime_error, one line for people: robot, logs, files.
 /// With a `model` it is that simulator's parameters that are inferred: CalibrateRemote. With `sbc`
 /// posteriors are judged, and nothing is written: JudgePosteriors. Both are for one rank.

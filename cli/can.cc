@@ -10,6 +10,7 @@
 #include "common/atomic_file.h"
 #include "drivers/bus/bus_plan.h"
 #include "drivers/bus/dbc.h"
+#include "drivers/protocols/known_protocols.h"
 #include "robot/description.h"
 
 namespace plumb {
@@ -28,6 +29,7 @@ size_t BusNamed(const std::vector<BusDescription>& buses, const std::string& nam
 
 int PrintBusPlan(const std::string& robot) {
   const RobotDescription description = LoadRobot(robot);
+  RequireProtocols(description);
   bool works = true;
   for (size_t i = 0; i < description.buses.size(); ++i) {
     const BusDescription& bus = description.buses[i];
@@ -43,6 +45,7 @@ int PrintBusPlan(const std::string& robot) {
 
 int WriteDbc(const std::string& robot, const std::string& bus, const std::string& output) {
   const RobotDescription description = LoadRobot(robot);
+  RequireProtocols(description);
   RequireOutputs({output}, FilesOf(description));
   const std::string text = ToDbc(BusDevices(description, BusNamed(description.buses, bus)));
   if (output.empty()) {

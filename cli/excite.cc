@@ -24,12 +24,12 @@ constexpr size_t kMaxRows = 10;
 std::string DescribeStart(const RobotDescription& robot, uint64_t seed) {
   const auto [q, v] = ExcitationStart(robot, seed);
   std::vector<std::string> joints;
-  Eigen::Index position = 0, velocity = 0;
-  for (const JointDescription& joint : robot.joints) {
-    joints.push_back(fmt::format("{} {:.4g} (speed {:.3g})", joint.name,
-                                 fmt::join(q.segment(position, joint.num_positions()), " "),
-                                 fmt::join(v.segment(velocity, joint.num_velocities()), " ")));
-    position += joint.num_positions(), velocity += joint.num_velocities();
+  for (int i = 0; i < robot.num_joints(); ++i) {
+    const JointDescription& joint = robot.joints[static_cast<size_t>(i)];
+    joints.push_back(
+        fmt::format("{} {:.4g} (speed {:.3g})", joint.name,
+                    fmt::join(q.segment(robot.position_of(i), joint.num_positions()), " "),
+                    fmt::join(v.segment(robot.velocity_of(i), joint.num_velocities()), " ")));
   }
   return fmt::format("it begins at {}", fmt::join(joints, ", "));
 }

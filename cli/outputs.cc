@@ -48,8 +48,8 @@ void RequireOutputs(const std::vector<std::string>& outputs,
 std::vector<std::string> FilesOf(const RobotDescription& robot) {
   std::vector<std::string> files = robot.meshes;
   Config root = Config::Load(robot.file, &files);
-  const std::filesystem::path folder = std::filesystem::path(robot.file).parent_path();
-  files.push_back((folder / root.Table("robot").String("urdf")).string());
+  Config header = root.Table("robot");
+  files.push_back(FindUrdf(header));
   return files;
 }
 

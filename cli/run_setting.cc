@@ -18,6 +18,7 @@
 #include "common/listen_address.h"
 #include "common/process_number.h"
 #include "drivers/driver/driver.h"
+#include "drivers/protocols/known_protocols.h"
 #include "sim/parameters.h"
 #include "sim/tasks/effort_table.h"
 #include "trainer/checkpoint.h"
@@ -31,6 +32,7 @@ namespace fs = std::filesystem;
 // Says before anything starts what the driver would otherwise say in its log.
 void RequireDrivable(const RobotDescription& robot) {
   try {
+    RequireProtocols(robot);
     Driver(robot, 0, 0);
   } catch (const std::invalid_argument& error) {
     throw std::invalid_argument(fmt::format("{} cannot be launched (plumb sim simulates it): {}",
@@ -55,7 +57,11 @@ fs::path MakeFolder(const std::string& wanted) {
       wanted.empty() ? fs::path("runs") / fmt::format("{:%Y-%m-%d-%H%M%S}-{}",
                                                       fmt::localtime(std::time(nullptr)), getpid())
                      : fs::path(wanted);
-  fs::create_directories(folder);
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error)
+    throw std::runtime_error(
+        fmt::format("{}: cannot be written: {}", folder.string(), error.message()));
   return folder;
 }
 

@@ -16,7 +16,7 @@
 #include "cli/roll_out.h"
 #include "common/atomic_file.h"
 #include "common/time_units.h"
-#include "drivers/protocols/registry.h"
+#include "drivers/protocols/known_protocols.h"
 #include "sim/simulators.h"
 #include "sim/tasks/effort_table.h"
 #include "sim/view/picture.h"
@@ -39,13 +39,10 @@ void RequireFiles(const SimFlags& flags, const RobotDescription& robot) {
 // A simulation needs no drives, but whoever has misspelt what they speak hears of it here, before
 // the first launch refuses it.
 void WarnOfProtocols(const RobotDescription& robot) {
-  for (const JointDescription& joint : robot.joints) {
-    if (joint.passive) continue;
-    try {
-      MotorBusDevice(joint.motor, robot.driver);
-    } catch (const std::invalid_argument& error) {
-      spdlog::warn("joint {}: {}: it cannot be driven", joint.name, error.what());
-    }
+  try {
+    RequireProtocols(robot);
+  } catch (const std::invalid_argument& error) {
+    spdlog::warn("{} cannot be driven: {}", robot.name, error.what());
   }
 }
 

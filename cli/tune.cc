@@ -1,7 +1,9 @@
 #include "cli/tune.h"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cmath>
 #include <iostream>
 #include <stdexcept>
@@ -9,8 +11,10 @@
 #include <vector>
 
 #include "calibrator/motion/log_reader.h"
+#include "calibrator/motion/recorded_robot.h"
 #include "common/progress_line.h"
 #include "estimator/noise_tuning.h"
+#include "plumb/place_robot_t.hpp"
 
 namespace plumb {
 namespace {
@@ -34,11 +38,11 @@ std::string Lines(const RobotDescription& robot, const TunedNoise& tuned, size_t
   return text;
 }
 
-}  // namespace
+using Message = std::variant<joint_state_t, imu_t, place_robot_t>;
 
-int TuneEstimator(const std::string& robot_path, const std::string& log) {
-  const RobotDescription robot = LoadRobot(robot_path);
-  std::vector<std::variant<joint_state_t, imu_t>> messages;
+// What of a log an observer is told, in the file's order.
+std::vector<Message> ReadMessages(const std::string& log) {
+  std::vector<Message> messages;
   int64_t undecodable = 0;
   const auto keep = [&](auto message, const void* data, int size) {
     if (Decodes(data, size, message))
@@ -46,25 +50,46 @@ int TuneEstimator(const std::string& robot_path, const std::string& log) {
     else
       ++undecodable;
   };
-  ReadLog(log, [&](const std::string& channel, const void* data, int size, int64_t) {
-    if (channel == "JOINT_STATE") keep(joint_state_t{}, data, size);
-    if (channel == "IMU") keep(imu_t{}, data, size);
-    return true;
-  });
-  if (messages.empty()) {
-    throw std::runtime_error(
-        fmt::format("{}: has no JOINT_STATE ({} undecodable)", log, undecodable));
+  const LogEnd end =
+      ReadLog(log, [&](const std::string& channel, const void* data, int size, int64_t) {
+        if (channel == "JOINT_STATE") keep(joint_state_t{}, data, size);
+        if (channel == "IMU") keep(imu_t{}, data, size);
+        if (channel == "PLACE_ROBOT") keep(place_robot_t{}, data, size);
+        return true;
+      });
+  if (std::ranges::none_of(messages, [](const Message& message) {
+        return std::holds_alternative<joint_state_t>(message);
+      })) {
+    throw std::runtime_error(fmt::format("{}: has no JOINT_STATE ({} undecodable){}", log,
+                                         undecodable, end.cut_off ? "; it is cut off" : ""));
   }
+  if (end.cut_off) spdlog::warn("{}: its last message is cut off", log);
+  return messages;
+}
+
+void Play(const std::vector<Message>& messages, StateObserver& observer) {
+  for (const Message& message : messages) {
+    if (const auto* imu = std::get_if<imu_t>(&message))
+      observer.OnImu(*imu);
+    else if (const auto* measured = std::get_if<joint_state_t>(&message))
+      observer.OnJointState(*measured);
+    else
+      observer.Place();
+  }
+}
+
+}  // namespace
+
+int TuneEstimator(const std::string& robot_path, const std::string& log) {
+  const RobotDescription robot = LoadRobot(robot_path);
+  for (const std::string& warning : CheckRecordedRobot(log, robot))
+    spdlog::warn("{}: {}", log, warning);
+  const std::vector<Message> messages = ReadMessages(log);
   ProgressLine line;
   int played = 0;
   const TunedNoise tuned = TuneNoise(robot, [&](StateObserver& observer) {
     line.Show("playing the log with other noise", static_cast<double>(played++) / kMaxPlays);
-    for (const auto& message : messages) {
-      if (const auto* imu = std::get_if<imu_t>(&message))
-        observer.OnImu(*imu);
-      else
-        observer.OnJointState(std::get<joint_state_t>(message));
-    }
+    Play(messages, observer);
   });
   const StateObserver observer(robot);
   for (size_t i = 0; i < tuned.joints.size(); ++i) {

@@ -97,6 +97,11 @@ bool Config::IsTable(const std::string& key) const {
   return Has(key) && table().get(key)->is_table();
 }
 
+std::string Config::FileOf(const std::string& key) const {
+  const toml::node* node = table().get(key);
+  return node && node->source().path ? *node->source().path : file_;
+}
+
 std::string Config::Position(const std::string& key) const {
   const toml::node* node = table().get(key);
   return TomlPlace(file_, node ? node->source() : table().source());

@@ -87,6 +87,8 @@ class Config {
 
   /// Call when everything has been read: the first key nobody read is an error.
   void Finish() const;
+  /// The file that says what `key` is: this one, or one that it extends.
+  std::string FileOf(const std::string& key) const;
   /// "file:line:column: " of `key` (or of the table, if it has no such key).
   std::string Position(const std::string& key) const;
   /// An error at the position of `key` (or of the table, if it has no such key).

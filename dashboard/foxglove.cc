@@ -18,14 +18,6 @@ constexpr uint8_t kMessageData = 1, kTime = 2, kServiceRequest = 2,
                   kServiceResponse = 3;  // opcodes
 constexpr size_t kMaxEntries = 1000;     // of one message
 
-json Parse(std::string_view text) {
-  try {
-    return ParseJson(text);
-  } catch (const json::exception&) {
-    throw std::runtime_error("this is no JSON");
-  }
-}
-
 std::string Quoted(std::string_view text) {
   std::string quoted;
   AppendJsonText(text, quoted);
@@ -133,7 +125,7 @@ std::string ServiceResponse(uint32_t service, uint32_t call, std::string_view js
 }
 
 ClientMessage ParseClientText(std::string_view text) {
-  const json message = Parse(text);
+  const json message = ParseJson(text);
   const auto op = message.is_object() ? message.find("op") : message.end();
   if (!message.is_object() || op == message.end() || !op->is_string())
     throw std::runtime_error("op: must be a text");

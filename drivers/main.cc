@@ -17,6 +17,7 @@
 #include "drivers/driver/driver.h"
 #include "drivers/driver/phase_times.h"
 #include "drivers/driver/state_log.h"
+#include "drivers/protocols/known_protocols.h"
 #include "drivers/robot_bus.h"
 #include "robot/description.h"
 
@@ -304,6 +305,7 @@ int main(int argc, char** argv) {
       },
       [&](plumb::Process& process) {
         plumb::RobotDescription robot = plumb::LoadRobot(robot_path);
+        plumb::RequireProtocols(robot);
         plumb::SetUrls(robot.buses, buses);
         plumb::RequireKey(process.lcm_url(), !process.key_file().empty(), allow_unsigned);
         // LCM's thread comes right behind the cycle: what it brings is part of it.

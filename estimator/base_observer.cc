@@ -66,11 +66,10 @@ BaseObserver::BaseObserver(const RobotDescription& robot)
       feet_(points_.size()) {
   for (auto* values : {&legs_.q, &legs_.v, &legs_.q_variance, &legs_.v_variance})
     values->setZero(robot.num_joints());
-  Eigen::Index q = 0, v = 0;
-  for (const JointDescription& joint : robot.joints) {
-    position_.push_back(q), velocity_.push_back(v);
-    if (joint.num_positions() == 4) q_[q] = 1;  // the unit quaternion
-    q += joint.num_positions(), v += joint.num_velocities();
+  for (int i = 0; i < robot.num_joints(); ++i) {
+    position_.push_back(robot.position_of(i)), velocity_.push_back(robot.velocity_of(i));
+    if (robot.joints[static_cast<size_t>(i)].num_positions() == 4)
+      q_[position_.back()] = 1;  // the unit quaternion
   }
   for (size_t i = 0; i < points_.size(); ++i) feet_[i].radius = points_[i].radius;
 }

@@ -14,6 +14,7 @@ namespace {
 // [us]; beyond it nothing is known of the motion in between
 constexpr int64_t kLongestGap = 1'000'000;
 constexpr int64_t kMaxAhead = 10'000;  // [us] of a joint's reading before the others
+constexpr int64_t kPlacing = 50'000;   // [us] until readings have told that the robot is elsewhere
 constexpr double kSurely = 5;          // standard deviations
 // [s] of a drive's velocity estimate: twice that of an ODrive as it comes
 constexpr double kVelocityLag = 4e-3;
@@ -49,7 +50,6 @@ StateObserver::StateObserver(const RobotDescription& robot)
         {sensor.name, MountingOf(robot, sensor.link), sensor.period, delay, {}, -1, false});
     imus_.back().of_base = base_ && sensor.name == robot.sensors[base_->base().imu].name;
   }
-  size_t position = 0, velocity = 0;
   for (int i = 0; i < robot.num_joints(); ++i) {
     const EstimatorSettings settings = EstimatorOf(robot, i);
     const auto turns = [&](const Imu& imu) { return imu.mounting.turned == i; };
@@ -59,21 +59,19 @@ StateObserver::StateObserver(const RobotDescription& robot)
                 .lower = robot.joints[static_cast<size_t>(i)].lower,
                 .upper = robot.joints[static_cast<size_t>(i)].upper,
                 .filter = KinematicFilter(settings),
-                .position = position,
-                .velocity = velocity,
+                .position = static_cast<size_t>(robot.position_of(i)),
+                .velocity = static_cast<size_t>(robot.velocity_of(i)),
                 .velocity_watch = AgreementWatch(VelocityWatch(settings, gyro)),
                 .acceleration_watch = AgreementWatch(AccelerationWatch(settings))};
     joint.of_base = base_ && base_->base().Has(i);
     joint.gyro = gyro;
     joints_.push_back(std::move(joint));
-    position += static_cast<size_t>(robot.joints[static_cast<size_t>(i)].num_positions());
-    velocity += static_cast<size_t>(robot.joints[static_cast<size_t>(i)].num_velocities());
   }
-  state_.num_positions = static_cast<int32_t>(position);
-  state_.num_velocities = static_cast<int32_t>(velocity);
-  state_.q.resize(position, 0);
+  state_.num_positions = robot.num_positions();
+  state_.num_velocities = robot.num_velocities();
+  state_.q.resize(static_cast<size_t>(state_.num_positions), 0);
   for (auto* values : {&state_.v, &state_.q_sd, &state_.v_sd, &state_.effort})
-    values->resize(velocity, 0);
+    values->resize(static_cast<size_t>(state_.num_velocities), 0);
   state_.num_contacts = contact_.num_points();
   state_.contact.assign(static_cast<size_t>(state_.num_contacts), -1);
   waiting_.assign(static_cast<size_t>(lag_) + 2, state_);
@@ -113,6 +111,15 @@ StateObserver::Use StateObserver::Judge(const joint_state_t& measured) const {
   const bool late = measured.utime < state_.utime && state_.utime - measured.utime <= kLongestGap &&
                     measured.sequence < state_.sequence;
   return late ? Use::kReordered : Use::kUse;
+}
+
+void StateObserver::Place() {
+  if (started_) placed_ = state_.utime;
+}
+
+bool StateObserver::Placed(const joint_state_t& measured) const {
+  // A clock that was set back begins anew, and says nothing of what was placed before.
+  return placed_ && measured.utime >= *placed_ && measured.utime - *placed_ <= kPlacing;
 }
 
 bool StateObserver::Displaced(const joint_state_t& measured) const {
@@ -273,7 +280,7 @@ bool StateObserver::OnJointState(const joint_state_t& measured) {
   }
   const int64_t elapsed = measured.utime - state_.utime;
   const bool jumped = started_ && (elapsed <= 0 || elapsed > kLongestGap);
-  bool anew = !started_ || jumped, back = false;
+  bool anew = !started_ || jumped || Placed(measured), back = false;
   if (!anew) {
     Predict(measured, Seconds(elapsed));
     anew = Displaced(measured);

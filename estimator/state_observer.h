@@ -49,6 +49,9 @@ class StateObserver {
   /// Handles a measurement. @return false if it was not used: wrong number of joints, not physical
   /// (robot/physical.h), not newer.
   bool OnJointState(const joint_state_t& measured);
+  /// The robot is being placed elsewhere: each measurement of the next 50 ms restarts the filter,
+  /// however small the jump. For logs, of which PLACE_ROBOT is known; live, jumps must tell.
+  void Place();
   /// Keeps a reading until the JOINT_STATE of its time or a later one.
   void OnImu(const imu_t& imu);
 
@@ -109,6 +112,7 @@ class StateObserver {
   Use Judge(const joint_state_t& measured) const;
   bool IsNew(const joint_state_t& measured, size_t joint) const;
   double Age(const joint_state_t& measured, size_t joint) const;
+  bool Placed(const joint_state_t& measured) const;
   bool Displaced(const joint_state_t& measured) const;
   bool Back(const joint_state_t& measured) const;
   void RestartAll(const joint_state_t& measured);
@@ -143,6 +147,7 @@ class StateObserver {
   size_t num_ready_ = 0;
   int since_restart_ = 0;
   bool started_ = false;
+  std::optional<int64_t> placed_;  // utime of the newest measurement when Place was called
   int64_t reasons_changed_ = 0;
   int64_t measurements_ = 0, refused_ = 0, duplicates_ = 0, reordered_ = 0, restarts_ = 0,
           outages_ = 0;

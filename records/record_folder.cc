@@ -19,6 +19,7 @@
 #include "robot/description.h"
 #include "robot/json_text.h"
 #include "robot/urdf/mesh.h"
+#include "robot/urdf/urdf.h"
 #include "robot/urdf/xml_edits.h"
 
 namespace plumb {
@@ -73,10 +74,11 @@ void ReadUrdf(const std::string& file, const std::vector<std::string>& meshes, R
 
 Robot ReadRobot(const std::string& folder_or_file) {
   const RobotDescription description = LoadRobot(folder_or_file);
-  const fs::path urdf = fs::path(description.file).parent_path() /
-                        Config::Load(description.file).Table("robot").String("urdf");
+  Config root = Config::Load(description.file);
+  Config header = root.Table("robot");
+  const std::string urdf = FindUrdf(header);
   Robot robot{description.name, MergedToml(description.file, "robot", "urdf", kUrdf), {}, {}};
-  ReadUrdf(urdf.string(), description.meshes, &robot);
+  ReadUrdf(urdf, description.meshes, &robot);
   return robot;
 }
 

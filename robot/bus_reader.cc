@@ -27,6 +27,13 @@ bool IsName(const std::string& text) {
   return !text.empty() && text.find_first_not_of(kLetters) == std::string::npos;
 }
 
+/// What is wrong with a URL that is a name alone, as `ip link` has it; empty: nothing.
+std::string SchemeFault(const std::string& url) {
+  if (url.find(':') != std::string::npos) return "";
+  return fmt::format("does not say which kind of bus it is: write socketcan:{}",
+                     url.empty() ? "can0" : url);
+}
+
 std::string Names(const std::vector<BusDescription>& buses) {
   std::vector<std::string> names;
   names.reserve(buses.size());
@@ -64,6 +71,8 @@ std::vector<BusDescription> ReadBuses(Config& root) {
         table.Fail("name", fmt::format("= \"{}\" occurs twice", bus.name));
     }
     bus.url = table.String("url");
+    if (const std::string fault = SchemeFault(bus.url); !fault.empty())
+      table.Fail("url", fmt::format("= \"{}\" {}", bus.url, fault));
     bus.bit_rate = table.Number("bit_rate", {1e4, 1e6}, bus.bit_rate);
     if (table.Has("data_bit_rate"))
       bus.data_bit_rate = table.Number("data_bit_rate", {bus.bit_rate, 8e6});
@@ -112,6 +121,8 @@ void SetUrls(std::vector<BusDescription>& buses, const std::vector<std::string>&
                       buses[0].name.empty() ? ": --bus URL" : "; there are: " + Names(buses)));
     }
     bus->url = named ? flag.substr(equals + 1) : flag;
+    if (const std::string fault = SchemeFault(bus->url); !fault.empty())
+      throw std::invalid_argument(fmt::format("--bus {}: {}", flag, fault));
   }
   for (size_t i = 0; i < buses.size(); ++i) {
     if (const BusDescription* same = SameBefore(buses, i)) {

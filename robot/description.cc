@@ -13,16 +13,16 @@
 
 namespace plumb {
 
-int RobotDescription::num_positions() const {
-  int count = 0;
-  for (const JointDescription& joint : joints) count += joint.num_positions();
-  return count;
+int RobotDescription::position_of(int joint) const {
+  int position = 0;
+  for (int i = 0; i < joint; ++i) position += joints[static_cast<size_t>(i)].num_positions();
+  return position;
 }
 
-int RobotDescription::num_velocities() const {
-  int count = 0;
-  for (const JointDescription& joint : joints) count += joint.num_velocities();
-  return count;
+int RobotDescription::velocity_of(int joint) const {
+  int velocity = 0;
+  for (int i = 0; i < joint; ++i) velocity += joints[static_cast<size_t>(i)].num_velocities();
+  return velocity;
 }
 
 std::vector<int> RobotDescription::driven() const {
@@ -150,11 +150,8 @@ fs::path FindRobot(const std::string& folder_or_file, bool* here) {
 }
 
 // The URDF that [robot] names. @param files is added to.
-UrdfModel ReadModel(Config header, const fs::path& folder, std::vector<std::string>* files) {
-  const std::string file = header.String("urdf"), path = (folder / file).string();
-  std::error_code error;
-  if (!fs::exists(path, error))
-    header.Fail("urdf", fmt::format("= \"{}\": there is no such file", file));
+UrdfModel ReadModel(Config header, std::vector<std::string>* files) {
+  const std::string path = FindUrdf(header);
   const std::vector<std::string> fixed = header.Strings("fixed", std::vector<std::string>{});
   header.Finish();
   files->push_back(path);
@@ -183,7 +180,7 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
   robot.file = file.string();
   Config header = root.Table("robot");
   robot.name = header.String("name");
-  UrdfModel urdf = ReadModel(std::move(header), file.parent_path(), &files);
+  UrdfModel urdf = ReadModel(std::move(header), &files);
   if (urdf.joints.empty()) root.Fail("robot", "has no moving joint in " + files.back());
   robot.buses = ReadBuses(root);
   robot.joints = ReadJoints(root, urdf, robot.buses);
@@ -192,7 +189,7 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
   robot.sensors = ReadSensors(root, robot);
   RequireUse(root, robot);
   robot.driver = ReadDriver(root.Table("driver"), robot.joints);
-  robot.task = ReadTask(root.Table("task"), robot.joints);
+  robot.task = ReadTask(root.Table("task"), robot.joints, robot.links);
   robot.simulation = ReadSimulation(root.Table("simulation"), robot.task.period);
   if (robot.simulation.contact && robot.simulation.meshes) {
     robot.meshes = urdf.LoadCollisionMeshes();

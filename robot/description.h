@@ -48,8 +48,10 @@ struct RobotDescription {
   VirtualRobotSettings virtual_robot;
 
   int num_joints() const { return static_cast<int>(joints.size()); }
-  int num_positions() const;   ///< size of q
-  int num_velocities() const;  ///< size of v and of efforts
+  int num_positions() const { return position_of(num_joints()); }   ///< size of q
+  int num_velocities() const { return velocity_of(num_joints()); }  ///< size of v and of efforts
+  int position_of(int joint) const;                                 ///< its first entry in q
+  int velocity_of(int joint) const;                                 ///< its first entry in v
   /// The joints with a motor, in order: an action has an entry for each.
   std::vector<int> driven() const;
   /// Of the driven joints, in order.

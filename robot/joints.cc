@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <limits>
 
@@ -27,6 +28,25 @@ constexpr MotorTable kMotorTables[] = {
     {"rmd", &ReadRmd, &CheckRmd},
 };
 
+// The protocols that have no table are for the drivers to know.
+bool IsMisspelt(std::string protocol, const char* table) {
+  if (std::ranges::any_of(kMotorTables, [&](const auto& t) { return protocol == t.protocol; }))
+    return false;
+  std::ranges::transform(protocol, protocol.begin(),
+                         [](unsigned char c) { return std::tolower(c); });
+  return EditDistance(protocol, table) <= 2;
+}
+
+[[noreturn]] void FailAtTable(const Config& config, const std::string& protocol,
+                              const char* table) {
+  if (IsMisspelt(protocol, table)) {
+    config.Fail("protocol",
+                fmt::format("= \"{}\" is not a known protocol; did you mean {}?", protocol, table));
+  }
+  config.Fail(table,
+              fmt::format("is of protocol \"{}\", but the motor's is \"{}\"", table, protocol));
+}
+
 MotorDescription ReadMotor(Config& config, const std::vector<BusDescription>& buses) {
   MotorDescription motor;
   motor.protocol = config.String("protocol");
@@ -40,8 +60,7 @@ MotorDescription ReadMotor(Config& config, const std::vector<BusDescription>& bu
     if (motor.protocol == table.protocol) {
       table.read(config, motor);
     } else if (config.Has(table.protocol)) {
-      config.Fail(table.protocol, fmt::format("is of protocol \"{}\", but the motor's is \"{}\"",
-                                              table.protocol, motor.protocol));
+      FailAtTable(config, motor.protocol, table.protocol);
     }
   }
   return motor;
@@ -144,6 +163,12 @@ bool NeedsFd(const MotorDescription& motor) {
   });
 }
 
+bool IsFixedJoint(const std::vector<LinkDescription>& links, const std::string& name) {
+  return std::ranges::any_of(links, [&](const LinkDescription& link) {
+    return std::ranges::find(link.fixed, name, &FixedLink::joint) != link.fixed.end();
+  });
+}
+
 std::vector<JointDescription> JointsOf(const UrdfModel& urdf) {
   std::vector<JointDescription> joints;
   for (const UrdfJoint& joint : urdf.joints) {
@@ -165,6 +190,10 @@ std::vector<JointDescription> ReadJoints(Config& root, const UrdfModel& urdf,
     const auto joint =
         std::find_if(joints.begin(), joints.end(), [&](const auto& j) { return j.name == name; });
     if (joint == joints.end()) {
+      if (IsFixedJoint(urdf.links, name))
+        config.Fail(
+            "name",
+            fmt::format("= \"{}\" is fixed: a joint that does not move has no table", name));
       std::vector<std::string> moving;
       moving.reserve(joints.size());
       for (const auto& j : joints) moving.push_back(j.name);

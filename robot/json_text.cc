@@ -5,6 +5,7 @@
 #include <cctype>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <string>
 
 namespace plumb {
 namespace {
@@ -30,11 +31,21 @@ void RequireModest(std::string_view text) {
   }
 }
 
+// Without the "[json.exception.parse_error.101] " in front, which tells a reader nothing.
+std::string InPlainWords(std::string_view complaint) {
+  const size_t end = complaint.starts_with('[') ? complaint.find("] ") : std::string_view::npos;
+  return std::string(end == std::string_view::npos ? complaint : complaint.substr(end + 2));
+}
+
 }  // namespace
 
 nlohmann::json ParseJson(std::string_view text) {
   RequireModest(text);
-  return nlohmann::json::parse(text);
+  try {
+    return nlohmann::json::parse(text);
+  } catch (const nlohmann::json::exception& error) {
+    throw std::runtime_error(InPlainWords(error.what()));
+  }
 }
 
 }  // namespace plumb

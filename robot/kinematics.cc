@@ -51,11 +51,7 @@ Kinematics::Kinematics(const RobotDescription& robot)
       num_positions_(robot.num_positions()),
       num_velocities_(robot.num_velocities()),
       links_(robot.links.size()) {
-  Eigen::Index next = 0;
-  for (const JointDescription& joint : joints_) {
-    velocity_index_.push_back(next);
-    next += joint.num_velocities();
-  }
+  for (int i = 0; i < robot.num_joints(); ++i) velocity_index_.push_back(robot.velocity_of(i));
 }
 
 void Kinematics::Update(const Vector& q, const Vector& v) {

@@ -73,6 +73,8 @@ void AddSimulation(const SimulationSettings& s, Fingerprint* hash) {
     hash->Add(pair.first), hash->Add(pair.second);
   hash->Add(s.stop ? "stop" : "");
   if (s.stop) hash->Add(s.stop->stiffness), hash->Add(s.stop->damping);
+  // Later than the rest, and so only where it is not 0; of a table it says when efforts act.
+  if (s.latency != 0) hash->Add("latency"), hash->Add(s.latency);
 }
 
 }  // namespace

@@ -17,7 +17,6 @@ Eigen::Quaterniond UnitQuaternionAt(const Placement::Vector& q, Eigen::Index i) 
 Placement::Placement(const RobotDescription& robot) : space_(robot) {
   std::optional<FloatingBase> base;
   if (robot.estimator.base == EstimatorSettings::Base::kLegs) base = FloatingBaseOf(robot);
-  Eigen::Index q = 0;
   for (int i = 0; i < robot.num_joints(); ++i) {
     const JointDescription& joint = robot.joints[static_cast<size_t>(i)];
     const auto v = static_cast<Eigen::Index>(names_.size());
@@ -25,14 +24,13 @@ Placement::Placement(const RobotDescription& robot) : space_(robot) {
       for (const ImuMounting::Slide& slide : base->slides) {
         if (slide.joint == i && std::abs(slide.direction.z()) < kLevel) unknown_.push_back(v);
       }
-      if (base->turned == i) rotation_ = v, quaternion_ = q;
+      if (base->turned == i) rotation_ = v, quaternion_ = robot.position_of(i);
     }
     if (joint.num_velocities() == 1) {
       names_.push_back(joint.name);
     } else {
       for (const char* axis : {"/x", "/y", "/z"}) names_.push_back(joint.name + axis);
     }
-    q += joint.num_positions();
   }
   if (rotation_ >= 0) up_ = base->zero.rotation.transpose() * Eigen::Vector3d::UnitZ();
 }

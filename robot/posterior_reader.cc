@@ -34,6 +34,14 @@ std::string ReadText(const std::filesystem::path& file) {
   return text;
 }
 
+json ParsePosterior(const std::string& text) {
+  try {
+    return ParseJson(text);
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(std::string("is no posterior.json: ") + error.what());
+  }
+}
+
 void RequireRobot(const Field& root, const RobotDescription& robot) {
   root["format"].RequireText(kPosteriorFormat, "is not a posterior");
   const double version = root["version"].Number();
@@ -126,7 +134,7 @@ void ReadGap(const Field& root, const RobotDescription& robot, ParameterDistribu
 ParameterDistribution ReadPosterior(const std::filesystem::path& file,
                                     const RobotDescription& robot) {
   try {
-    const json j = ParseJson(ReadText(file));
+    const json j = ParsePosterior(ReadText(file));
     const Field root(j, "");
     if (!j.is_object()) throw std::runtime_error("is not a posterior");
     RequireRobot(root, robot);

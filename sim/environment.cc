@@ -43,10 +43,9 @@ void Environment::SendThroughDriver() {
     }
   }
   drives_.clear();
-  Eigen::Index position = 0, velocity = 0;
-  for (const JointDescription& joint : robot.joints) {
-    if (!joint.passive) drives_.push_back({position, velocity, LimitsOf(joint)});
-    position += joint.num_positions(), velocity += joint.num_velocities();
+  for (const int i : robot.driven()) {
+    drives_.push_back({robot.position_of(i), robot.velocity_of(i),
+                       LimitsOf(robot.joints[static_cast<size_t>(i)])});
   }
 }
 

@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -18,6 +19,7 @@
 #include "common/seed_range.h"
 #include "common/time_units.h"
 #include "drivers/can/transport.h"
+#include "drivers/protocols/known_protocols.h"
 #include "plumb/place_robot_t.hpp"
 #include "sim/parameters.h"
 #include "sim/tasks/task.h"
@@ -92,89 +94,113 @@ struct Bus {
   int64_t next_reopen = 0;
 };
 
-int Serve(Process& process, const RobotDescription& description, const Eigen::VectorXd& physical,
-          uint64_t seed) {
-  constexpr int kBursts = 16;  // of frames per wake, so that a flood cannot stop time
-  const Clock& clock = process.clock();
-  VirtualRobot robot(description, physical, clock.Utime());
-  Stand(description, seed, robot);
-  std::vector<Bus> buses;
-  std::vector<int> fds;
-  for (const BusDescription& bus : description.buses) {
-    buses.push_back({bus.url, OpenTransport(bus.url, robot.filters(buses.size()),
-                                            {process.participant(),
-                                             Microseconds(description.estimator.delay)})});
-    fds.push_back(buses.back().transport->fd());
+/// The robot between its buses and PLACE_ROBOT.
+class Server {
+ public:
+  Server(Process& process, const RobotDescription& description, const Eigen::VectorXd& physical,
+         uint64_t seed)
+      : process_(process),
+        clock_(process.clock()),
+        robot_(description, physical, clock_.Utime()),
+        answers_(description.buses.size()) {
+    Stand(description, seed, robot_);
+    for (const BusDescription& bus : description.buses) {
+      buses_.push_back({bus.url, OpenTransport(bus.url, robot_.filters(buses_.size()),
+                                               {process.participant(),
+                                                Microseconds(description.estimator.delay)})});
+      fds_.push_back(buses_.back().transport->fd());
+    }
+    process.messenger().Follow(description.name);
+    places_.emplace(process.messenger(), "PLACE_ROBOT",
+                    [this](const place_robot_t& wish) { Place(wish); });
+    for (const Bus& bus : buses_) {
+      for (const std::string& warning : bus.transport->warnings()) spdlog::warn("{}", warning);
+    }
+    spdlog::info("{} is on {}", description.name, InOneLine(description.buses));
   }
-  process.messenger().Follow(description.name);
-  Subscriber<place_robot_t> places(
-      process.messenger(), "PLACE_ROBOT", [&](const place_robot_t& wish) {
-        const Eigen::Map<const Eigen::VectorXd> q(wish.q.data(),
-                                                  static_cast<Eigen::Index>(wish.q.size()));
-        const Eigen::Map<const Eigen::VectorXd> v(wish.v.data(),
-                                                  static_cast<Eigen::Index>(wish.v.size()));
-        if (!robot.Place(wish.utime, q, v))
-          spdlog::debug("PLACE_ROBOT asks for a state that this robot cannot have");
-      });
-  for (const Bus& bus : buses) {
-    for (const std::string& warning : bus.transport->warnings()) spdlog::warn("{}", warning);
-  }
-  spdlog::info("{} is on {}", description.name, InOneLine(description.buses));
 
+  void Run() {
+    int64_t now = clock_.Utime();
+    while (process_.Wait(std::min({robot_.NextEvent() - now, kReopenPeriod, UntilFrame()}), fds_)) {
+      // First the time, then the frames: what arrives in between must not find the robot already
+      // past it.
+      now = clock_.Utime();
+      Gather(now);
+      // The robot's time goes on with each: one bus must not be ahead of another.
+      for (const Arrival& arrival : arrivals_) {
+        robot_.Receive(arrival.bus, arrival.frame, arrival.utime, answers_);
+        Answer();
+      }
+      robot_.Advance(now, answers_);
+      Answer();
+      for (Bus& bus : buses_) bus.Watch(clock_.Now());
+      now = clock_.Utime();
+    }
+  }
+
+ private:
   struct Arrival {
     int64_t utime;
     size_t bus;
     Frame frame;
   };
-  std::array<Frame, 32> frames;
-  std::vector<Arrival> arrivals;
-  std::vector<FrameBatch> answers(buses.size());
-  int64_t now = clock.Utime();
-  const auto until_frame = [&] {
+  static constexpr int kBursts = 16;  // of frames per wake, so that a flood cannot stop time
+
+  void Place(const place_robot_t& wish) {
+    const auto vector = [](const std::vector<double>& values) {
+      return Eigen::Map<const Eigen::VectorXd>(values.data(),
+                                               static_cast<Eigen::Index>(values.size()));
+    };
+    if (!robot_.Place(wish.utime, vector(wish.q), vector(wish.v)))
+      spdlog::debug("PLACE_ROBOT asks for a state that this robot cannot have");
+  }
+
+  // [us] until a transport has one by itself.
+  int64_t UntilFrame() const {
     int64_t next = Transport::kNever;
-    for (const Bus& bus : buses) next = std::min(next, bus.transport->NextEvent());
-    return std::max(next, clock.Now()) - clock.Now();
-  };
-  const auto send = [&] {
-    for (size_t i = 0; i < buses.size(); ++i) {
-      if (answers[i].size() > 0) buses[i].transport->Send(answers[i].frames());
-      answers[i].Clear();
-    }
-  };
-  while (process.Wait(std::min({robot.NextEvent() - now, kReopenPeriod, until_frame()}), fds)) {
-    // First the time, then the frames: what arrives in between must not find the robot already past
-    // it.
-    now = clock.Utime();
-    arrivals.clear();
-    for (size_t bus = 0; bus < buses.size(); ++bus) {
-      Transport& transport = *buses[bus].transport;
-      transport.SetTime(clock.Now());
+    for (const Bus& bus : buses_) next = std::min(next, bus.transport->NextEvent());
+    return std::max(next, clock_.Now()) - clock_.Now();
+  }
+
+  // What has come on all buses, in the order of its times.
+  void Gather(int64_t now) {
+    arrivals_.clear();
+    for (size_t bus = 0; bus < buses_.size(); ++bus) {
+      Transport& transport = *buses_[bus].transport;
+      transport.SetTime(clock_.Now());
       for (int burst = 0; burst < kBursts; ++burst) {
-        const int count = transport.Receive(frames);
+        const int count = transport.Receive(frames_);
         if (count == 0) break;
-        for (const Frame& frame : std::span(frames).first(static_cast<size_t>(count))) {
+        for (const Frame& frame : std::span(frames_).first(static_cast<size_t>(count))) {
           const int64_t at =
-              frame.receive_ns == 0 ? now : clock.UtimeFromRealtimeNs(frame.receive_ns);
+              frame.receive_ns == 0 ? now : clock_.UtimeFromRealtimeNs(frame.receive_ns);
           // Of one bus in the order in which it gives them, whatever clocks and faults do.
-          const bool first = arrivals.empty() || arrivals.back().bus != bus;
-          const int64_t before = first ? at : arrivals.back().utime;
-          arrivals.push_back({std::min(std::max(before, at), now), bus, frame});
+          const bool first = arrivals_.empty() || arrivals_.back().bus != bus;
+          const int64_t before = first ? at : arrivals_.back().utime;
+          arrivals_.push_back({std::min(std::max(before, at), now), bus, frame});
         }
       }
     }
-    // The robot's time goes on with each: one bus must not be ahead of another.
-    std::ranges::stable_sort(arrivals, {}, &Arrival::utime);
-    for (const Arrival& arrival : arrivals) {
-      robot.Receive(arrival.bus, arrival.frame, arrival.utime, answers);
-      send();
-    }
-    robot.Advance(now, answers);
-    send();
-    for (Bus& bus : buses) bus.Watch(clock.Now());
-    now = clock.Utime();
+    std::ranges::stable_sort(arrivals_, {}, &Arrival::utime);
   }
-  return 0;
-}
+
+  void Answer() {
+    for (size_t i = 0; i < buses_.size(); ++i) {
+      if (answers_[i].size() > 0) buses_[i].transport->Send(answers_[i].frames());
+      answers_[i].Clear();
+    }
+  }
+
+  Process& process_;
+  const Clock& clock_;
+  VirtualRobot robot_;
+  std::vector<Bus> buses_;
+  std::vector<int> fds_;
+  std::array<Frame, 32> frames_;
+  std::vector<Arrival> arrivals_;
+  std::vector<FrameBatch> answers_;  // of each bus
+  std::optional<Subscriber<place_robot_t>> places_;
+};
 
 }  // namespace
 }  // namespace plumb
@@ -202,11 +228,13 @@ int main(int argc, char** argv) {
       [&](plumb::Process& process) {
         process.BecomeFast(priority);
         plumb::RobotDescription description = plumb::LoadRobot(robot_path);
+        plumb::RequireProtocols(description);
         plumb::SetUrls(description.buses, buses);
         Eigen::VectorXd physical = plumb::HiddenParameters(description, seed);
         for (const std::string& assignment : assignments)
           plumb::Set(assignment, description, physical);
         plumb::LogTruth(description, physical, seed);
-        return plumb::Serve(process, description, physical, seed);
+        plumb::Server(process, description, physical, seed).Run();
+        return 0;
       });
 }

@@ -86,7 +86,7 @@ RobotDescription Model::Describe(const Eigen::Ref<const Eigen::VectorXd>& physic
   robot.frozen.clear();
   robot.virtual_robot.hidden.clear();
   const auto vector = [](const double* numbers) { return Vector3d(Vector3d::Map(numbers)); };
-  size_t velocity = 0, point = 0;
+  size_t point = 0;
   for (size_t i = 0; i < robot.joints.size(); ++i) {
     const Physics<double>::Link& now = physics.links[i];
     const Matrix3d& axes = topology_.link_axes[i + 1];
@@ -101,8 +101,7 @@ RobotDescription Model::Describe(const Eigen::Ref<const Eigen::VectorXd>& physic
     JointDescription& joint = robot.joints[i];
     joint.origin =
         topology_.link_axes[static_cast<size_t>(joint.parent)].transpose() * vector(now.origin);
-    joint.dynamics = physics.axes[velocity];
-    velocity += static_cast<size_t>(joint.num_velocities());
+    joint.dynamics = physics.axes[static_cast<size_t>(topology_.joints[i].velocity)];
   }
   SimulationSettings& settings = robot.simulation;
   settings.set_world(physics.world);

@@ -35,9 +35,9 @@ std::vector<ParameterPath> ParameterPaths(const RobotDescription& description,
 /// The one of that name, or all that it covers (robot/parameters.h) and that are not in `named`:
 /// those that another parameter names in full, and that have an effect.
 /// @throws std::invalid_argument naming the nearest if there is none, if they are of several kinds,
-/// and, if it is known, the robot's file.
+/// and, if it is known, the place in the robot's file.
 std::vector<ParameterPath> FindPaths(const std::vector<ParameterPath>& paths,
                                      const std::string& name, const std::set<std::string>& named,
-                                     const std::string& file);
+                                     const RobotDescription& description);
 
 }  // namespace plumb

@@ -111,7 +111,7 @@ void Parameters::FindPathsOf(const RobotDescription& description) {
   for (const FrozenParameter& parameter : description.frozen) named.insert(parameter.name);
   std::map<std::string, std::string> given;  // by which parameter
   const auto find = [&](const std::string& name) {
-    std::vector<ParameterPath> paths = FindPaths(all, name, named, description.file);
+    std::vector<ParameterPath> paths = FindPaths(all, name, named, description);
     for (const ParameterPath& path : paths) {
       const auto [other, is_new] = given.try_emplace(path.path, name);
       if (is_new) continue;

@@ -12,11 +12,10 @@ TouchFinder::TouchFinder(const RobotDescription& robot, double margin)
       kinematics_(robot),
       points_(ContactPoints(robot)),
       still_(Eigen::VectorXd::Zero(robot.num_velocities())) {
-  Eigen::Index position = 0;
-  for (const JointDescription& joint : robot.joints) {
+  for (int i = 0; i < robot.num_joints(); ++i) {
+    const JointDescription& joint = robot.joints[static_cast<size_t>(i)];
     if (robot.simulation.stop && joint.type != JointDescription::Type::kSpherical)
-      stops_.push_back({position, joint.lower, joint.upper});
-    position += joint.num_positions();
+      stops_.push_back({robot.position_of(i), joint.lower, joint.upper});
   }
   ContactPairs touching = FindContactPairs(robot);
   for (const ContactPairs::Solid& at : touching.solids) {

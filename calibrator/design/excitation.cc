@@ -68,7 +68,7 @@ class Rater {
     draws_ << belief.mean, Draws();
   }
 
-  std::optional<RatedExcitation> Rate(Excitation excitation) {
+  std::optional<RatedExcitation> Rate(const Excitation& excitation) {
     for (const double scale : kScales) {
       Excitation scaled = excitation;
       scaled.action *= scale;

@@ -137,7 +137,10 @@ std::vector<Misfit> TestOutliers(const ProjectedErrors& errors) {
       Rows out;
       std::copy_if(rows.begin(), rows.end(), std::back_inserter(out),
                    [&](Eigen::Index i) { return errors.outlying[static_cast<size_t>(i)]; });
-      const auto count = static_cast<double>(out.size()), all = static_cast<double>(rows.size());
+      const auto again = std::ranges::count_if(
+          out, [&](Eigen::Index i) { return errors.repeated[static_cast<size_t>(i)]; });
+      const auto count = static_cast<double>(out.size()) - static_cast<double>(again),
+                 all = static_cast<double>(rows.size());
       const double p =
           count == 0 ? 1 : cdf(complement(boost::math::poisson(all * expected), count - 1));
       const std::string& name = errors.joint_of[static_cast<size_t>(joint)];

@@ -28,7 +28,7 @@ using Vectors = std::vector<Eigen::VectorXd>;
 // first.
 std::vector<Eigen::VectorXd> SmallPowers(Eigen::Index n) {
   std::vector<Eigen::VectorXd> powers;
-  const auto base = static_cast<size_t>(2 * kLargestPower + 1);
+  const size_t base = 2 * size_t{kLargestPower} + 1;
   size_t count = 1;
   for (Eigen::Index i = 0; i < n; ++i) count *= base;
   for (size_t code = 0; code < count; ++code) {

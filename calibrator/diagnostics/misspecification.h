@@ -97,7 +97,8 @@ struct FitResiduals {
 /// effect is not negligible: with enough data any model is wrong. Thresholds: kLeastShare of the
 /// errors' variance for bias and structure, kLeastCorrelation for whiteness (smoothed states make
 /// some), kLeastExcess for scale (noise is seldom known better), and of a joint's errors in a
-/// condition kLeastOutliers must be outliers; fewer are told of without an alarm.
+/// condition kLeastOutliers must be outliers, those of two transitions that share a bad reading
+/// counting as one's; fewer are told of without an alarm.
 ///
 /// What is told: candidates that explain most, one after the other, each time with what is left;
 /// then what none of them explains. Nearly as good candidates are named as alternatives.

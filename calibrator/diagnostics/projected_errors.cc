@@ -152,16 +152,29 @@ void ProjectedErrors::Weigh(const Eigen::VectorXd& errors) {
   for (const auto& [key, values] : sizes)
     largest[key] = kOutlier * std::max(1.0, 1.4826 * Median(values));
   weight.setOnes(errors.size());
-  Eigen::Index outliers = 0;
   for (Eigen::Index i = 0; i < errors.size(); ++i) {
     const double ratio = largest[group(i)] / std::abs(errors(i));
     outlying.push_back(ratio < 1);
-    if (ratio >= 1) continue;
-    weight(i) = ratio;
-    ++outliers;
+    if (ratio < 1) weight(i) = ratio;
   }
+  FindRepeated();
+  const auto outliers = std::ranges::count(outlying, true) - std::ranges::count(repeated, true);
   few_outliers =
       static_cast<double>(outliers) < kLeastOutliers * static_cast<double>(errors.size());
+}
+
+void ProjectedErrors::FindRepeated() {
+  std::vector<bool> spoilt(steps.size(), false), again(steps.size(), false);
+  for (size_t i = 0; i < outlying.size(); ++i) {
+    if (outlying[i]) spoilt[static_cast<size_t>(step_of[i])] = true;
+  }
+  for (size_t i = 0; i < steps.size(); ++i) {
+    if (!spoilt[i] || again[i] || !steps[i].shares_state) continue;
+    const auto next = static_cast<size_t>(steps[i].next);
+    again[next] = spoilt[next];
+  }
+  for (size_t i = 0; i < outlying.size(); ++i)
+    repeated.push_back(outlying[i] && again[static_cast<size_t>(step_of[i])]);
 }
 
 std::string ProjectedErrors::Place(const std::string& joint, const std::string& condition) const {

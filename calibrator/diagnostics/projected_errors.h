@@ -44,6 +44,9 @@ struct ProjectedErrors {
   std::vector<int> coordinate;  ///< of each row
   /// of each row: beyond kOutlier robust sd of its coordinate and condition
   std::vector<bool> outlying;
+  /// Of each row: outlying, and so was the step before, which ended with the reading that this one
+  /// begins with: a bad reading spoils both, and counts once.
+  std::vector<bool> repeated;
   /// Of each coordinate: its noise is said to be known, and the errors are significantly smaller
   /// than that.
   std::vector<bool> quiet;
@@ -64,6 +67,7 @@ struct ProjectedErrors {
  private:
   std::vector<bool> noise_known_;
   void Weigh(const Eigen::VectorXd& errors);
+  void FindRepeated();
   void Take(const Eigen::VectorXd& weighted);
 };
 

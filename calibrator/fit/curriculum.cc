@@ -308,4 +308,12 @@ CurriculumFit FitCurriculum(std::shared_ptr<const Model> model, std::span<const 
   return Curriculum(std::move(model), rollouts, options).Run(start);
 }
 
+bool LeavesRounding(const Eigen::VectorXd& noise_sd, const Eigen::VectorXd& units,
+                    const Eigen::VectorXd& errors) {
+  constexpr double kBeyond = 5, kHardlyAny = 0.01;
+  const auto beyond = static_cast<double>((errors.array().abs() > kBeyond).count());
+  return (noise_sd.array() <= kNegligible * units.array()).all() &&
+         beyond <= kHardlyAny * static_cast<double>(errors.size());
+}
+
 }  // namespace plumb

@@ -136,9 +136,8 @@ MethodResult Auto(const MethodInput& input) {
   MethodResult result = Laplace(input);
   const CurriculumFit& curriculum = *result.curriculum;
   if (!curriculum.others.empty()) return MixtureFrom(input, std::move(result));
-  if ((curriculum.noise_sd.array() <=
-       kNegligible * MakeTask(input.model->description())->state_scale().array())
-          .all()) {
+  if (LeavesRounding(curriculum.noise_sd, MakeTask(input.model->description())->state_scale(),
+                     curriculum.one_step.errors)) {
     result.check =
         "the log is explained to five digits: what is left is rounding, whose likelihood has no "
         "shape to check";

@@ -1,5 +1,6 @@
 #include "calibrator/fit/streaming.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>

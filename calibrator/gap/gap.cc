@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <utility>
 #include <vector>
@@ -87,15 +88,19 @@ std::string InWords(const char* where, const ResidualQuality& quality) {
                      where, 100 * MeanExplained(quality));
 }
 
-std::string Summarise(bool free, bool touching, const Gap& gap) {
-  std::string text = !free      ? "contact"
-                     : touching ? "neither free motion nor contact"
-                                : "the motion";
+std::string Unexplained(bool free, bool touching, const Gap& gap) {
+  const char* what = !free      ? "does not explain contact"
+                     : touching ? "explains neither free motion nor contact"
+                                : "does not explain the motion";
   const char* informed = gap.informed == Informed::kNone ? "nothing informs its parameters"
                          : gap.informed == Informed::kFree
                              ? "its parameters are learnt from free motion alone"
                              : "its parameters are learnt from what contacts cannot have done";
-  text = fmt::format("the model does not explain {}: {}", text, informed);
+  return fmt::format("the model {}: {}", what, informed);
+}
+
+std::string Summarise(bool free, bool touching, const Gap& gap) {
+  std::string text = Unexplained(free, touching, gap);
   if (!gap.residual) return text + "; too little was recorded to learn what it lacks";
   text += "; of what it lacks, the learnt residual explains, of ";
   std::string parts;
@@ -214,6 +219,12 @@ Eigen::VectorXd Explained(const ResidualQuality& quality) {
   const Eigen::ArrayXd before = quality.before.array().square(),
                        after = quality.after.array().square();
   return (1 - after / before.max(1e-300)).max(0);
+}
+
+void LeaveOut(const std::string& why, Gap* gap) {
+  const bool free = gap->residual->free.has_value(), touching = gap->residual->touching.has_value();
+  gap->residual = nullptr;
+  gap->summary = Unexplained(free, touching, *gap) + "; " + why;
 }
 
 GapFit CloseGap(const MethodInput& input, MethodResult all, const std::string& not_judged) {

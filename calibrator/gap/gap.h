@@ -75,6 +75,10 @@ struct GapFit {
 /// @throws std::invalid_argument as FitResidual.
 GapFit CloseGap(const MethodInput& input, MethodResult all, const std::string& not_judged = {});
 
+/// Takes the residual, of which there is one, out of what is known of a gap, and says why.
+/// Thread-safe.
+void LeaveOut(const std::string& why, Gap* gap);
+
 /// The steps of roll-outs that begin and end away from the ground and from stops. Thread-safe.
 std::vector<Rollout> FreeSteps(const RobotDescription& robot, std::span<const Rollout> rollouts);
 /// The steps that the parameters are learnt from, or would be if anything informed them.

@@ -169,6 +169,7 @@ VectorXd MedianDeviation(const MatrixXd& outcomes) {
   VectorXd deviation = VectorXd::Zero(outcomes.rows());
   for (Index i = 0; i < outcomes.rows() && !finite.empty(); ++i) {
     std::vector<double> values;
+    values.reserve(finite.size());
     for (const Index j : finite) values.push_back(outcomes(i, j));
     const double centre = Median(values);
     for (double& value : values) value = std::abs(value - centre);

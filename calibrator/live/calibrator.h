@@ -21,8 +21,7 @@ namespace plumb {
 /// interleave. Not thread-safe.
 class Calibrator {
  public:
-  Calibrator(const RobotDescription& robot, SimOpt& simopt)
-      : robot_(robot), simopt_(simopt), joiner_(robot) {}
+  Calibrator(const RobotDescription& robot, SimOpt& simopt) : simopt_(simopt), joiner_(robot) {}
 
   void OnState(const robot_state_t& smoothed) { joiner_.OnState(smoothed); }
   void OnCommand(const joint_command_t& command);
@@ -40,7 +39,6 @@ class Calibrator {
   const DropCounts& drops() const { return joiner_.drops(); }
 
  private:
-  const RobotDescription& robot_;
   SimOpt& simopt_;
   TransitionJoiner joiner_;
   std::optional<controller_status_t> complete_;

@@ -9,6 +9,7 @@
 
 #include "calibrator/motion/differences.h"
 #include "calibrator/motion/motion_table.h"
+#include "calibrator/motion/table_units.h"
 #include "common/median.h"
 #include "common/special_numbers.h"
 
@@ -188,6 +189,19 @@ class Assembly {
   std::vector<double> late_;  // intervals
 };
 
+// Which joints' velocities nobody has read, and what that means.
+void TellVelocities(const RobotDescription& robot, bool in_table, Log* log) {
+  if (in_table) {
+    log->differenced = DifferencedJoints(robot, log->rollouts);
+    if (!log->differenced.empty()) log->warnings.push_back(DifferencesWarning(log->differenced));
+    return;
+  }
+  for (const JointDescription& joint : robot.joints) log->differenced.push_back(joint.name);
+  log->warnings.push_back(
+      "has no v/ columns: auto, laplace and mixture use positions alone; other methods take their "
+      "differences for velocities, and intervals will be too narrow");
+}
+
 }  // namespace
 
 Log ReadCsvLog(const std::string& file, const RobotDescription& robot) {
@@ -203,12 +217,13 @@ Log JoinMotion(const std::string& name, MotionTable table, const RobotDescriptio
   Assembly assembly(robot, table.has_next, &log);
   assembly.Take(table.rows, links);
   if (!log.rollouts.empty()) {
-    if (table.has_velocities) {
-      log.differenced = DifferencedJoints(robot, log.rollouts);
-    } else {
-      for (const JointDescription& joint : robot.joints) log.differenced.push_back(joint.name);
+    TellVelocities(robot, table.has_velocities, &log);
+    if (robot.simulation.latency > 0) {
+      log.warnings.push_back(
+          fmt::format("the command of a row acts from {:g} ms after it on, as [simulation] latency "
+                      "says",
+                      1e3 * robot.simulation.latency));
     }
-    if (!log.differenced.empty()) log.warnings.push_back(DifferencesWarning(log.differenced));
     return log;
   }
   std::string why;
@@ -217,6 +232,8 @@ Log JoinMotion(const std::string& name, MotionTable table, const RobotDescriptio
   } else if (log.drops.late == log.drops.total()) {
     why = fmt::format("its rows are {:.6g} s apart, but the task's control period is {:.6g} s",
                       assembly.late_interval(), robot.task.period);
+    const std::string question = AskTimeUnit(assembly.late_interval(), robot.task.period);
+    if (!question.empty()) why += ": " + question;
   } else {
     why = log.drops.summary();
   }

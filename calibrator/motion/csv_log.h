@@ -16,7 +16,7 @@ namespace plumb {
 ///       a thousandth, and /x, /y, /z in v
 ///   u/<joint>   of each driven joint: effort / Task::action_unit, held for one control period. As
 ///       in the simulator, it is clipped to the effort limits and acts simulation.latency late, the
-///       one before until then; before an episode there was none
+///       one before until then, of which a warning tells; before an episode there was none
 ///   target_q/<joint>   instead, or besides: where the joint's drive, which runs a position loop of
 ///       its own, was told to go; kp/<joint>, kd/<joint> must then be robot.toml's (DriveTargets)
 ///   next_q/<joint>, next_v/<joint>   the state s' that it led to. Without these columns, as
@@ -35,7 +35,8 @@ namespace plumb {
 /// they are, too, if s is a reading: the very same one as the end of the transition before, or the
 /// first of a stretch of such; else the beginning is taken as exact, and they are 0.
 ///
-/// Velocities that are but differences of the positions are told of (DifferencedJoints).
+/// Velocities that are but differences of the positions are told of (DifferencedJoints), and
+/// numbers that look like other units than the robot's (table_units.h).
 ///
 /// Fields are separated by commas and may be quoted; blank lines and those that begin with # are
 /// skipped. Numbers have a decimal point in every locale.

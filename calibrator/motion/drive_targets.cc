@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <utility>
 
 #include "robot/physical.h"
 
@@ -17,13 +16,10 @@ constexpr double kSameGain = 1e-6;  // of it: written with few digits
 DriveTargets::DriveTargets(const CsvReader& table, const RobotDescription& robot,
                            std::vector<int> target, std::vector<int> kp, std::vector<int> kd)
     : table_(table), velocities_(robot.num_velocities()) {
-  Eigen::Index velocity = 0;
-  size_t driven = 0;
-  for (const JointDescription& joint : robot.joints) {
-    const Eigen::Index at = std::exchange(velocity, velocity + joint.num_velocities());
-    if (joint.passive) continue;
-    const size_t i = driven++;
-    drives_.push_back({at, joint.dynamics, target[i], kp[i], kd[i]});
+  const std::vector<int> driven = robot.driven();
+  for (size_t i = 0; i < driven.size(); ++i) {
+    const JointDescription& joint = robot.joints[static_cast<size_t>(driven[i])];
+    drives_.push_back({robot.velocity_of(driven[i]), joint.dynamics, target[i], kp[i], kd[i]});
     if (target[i] < 0) continue;
     const std::string column = "target_q/" + joint.name;
     if (!(joint.dynamics.kp > 0)) {

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "calibrator/motion/motion_log.h"
+#include "calibrator/motion/recorded_robot.h"
 #include "common/time_units.h"
 #include "robot/physical.h"
 
@@ -175,7 +176,7 @@ class EpisodeJoiner {
 }  // namespace
 
 Log ReadLcmLog(const std::string& file, const RobotDescription& robot) {
-  Log log{file, {}, {}, {}};
+  Log log{file, {}, {}, CheckRecordedRobot(file, robot)};
   EpisodeJoiner joiner(robot, &log.rollouts);
   const MotionCounts counts = ReadMotion(file, joiner, [] { return true; });
   joiner.Finish();
@@ -196,7 +197,10 @@ Log ReadLcmLog(const std::string& file, const RobotDescription& robot) {
     log.warnings.push_back(fmt::format("{} messages are of a robot with {} {}, '{}' has {}",
                                        joiner.foreign(), its, of_what, robot.name, ours));
   }
-  if (!log.rollouts.empty()) return log;
+  if (!log.rollouts.empty()) {
+    if (counts.cut_off) log.warnings.push_back("its last message is cut off");
+    return log;
+  }
   if (log.drops.model_based > 0) {
     throw std::runtime_error(
         file +
@@ -204,17 +208,20 @@ Log ReadLcmLog(const std::string& file, const RobotDescription& robot) {
         "assumed. ROBOT_STATE_SMOOTHED has to be a kinematic estimator's");
   }
   std::string why;
-  if (counts.messages == 0) {
+  if (counts.events == 0) {
+    why = counts.cut_off ? "its first message is cut off" : "it is empty";
+  } else if (counts.messages == 0) {
     why = fmt::format(
         "none of its {} messages is a ROBOT_STATE_SMOOTHED, JOINT_COMMAND or CONTROLLER_STATUS",
         counts.events);
-  } else if (joiner.fitting() == 0 && !log.warnings.empty()) {
+  } else if (joiner.fitting() == 0 && joiner.foreign() + counts.undecodable > 0) {
     why = log.warnings.back();
   } else if (log.drops.total() == 0) {
     why = "it holds no command of an episode";
   } else {
     why = log.drops.summary();
   }
+  if (counts.events > 0 && counts.cut_off) why += "; its last message is cut off";
   throw std::runtime_error(file + ": no transition can be used: " + why);
 }
 

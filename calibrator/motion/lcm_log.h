@@ -13,8 +13,8 @@ namespace plumb {
 /// CONTROLLER_STATUS names; else the one that the next command answers, be it of another episode or
 /// of none; else the one a control period after its last command's.
 /// @throws std::runtime_error naming the file and what is wrong: it cannot be opened, is damaged,
-/// has none of these messages, is of a robot with another number of joints, or no transition of it
-/// can be used (and why).
+/// has none of these messages, is of another robot (CheckRecordedRobot) or one with another number
+/// of joints, or no transition of it can be used (and why).
 /// Thread-safe.
 Log ReadLcmLog(const std::string& file, const RobotDescription& robot);
 

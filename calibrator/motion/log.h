@@ -14,7 +14,8 @@ struct Log {
   std::string name;               ///< the file
   std::vector<Rollout> rollouts;  ///< each with at least one transition, in the file's order
   DropCounts drops;
-  std::vector<std::string> warnings;  ///< parts of the file that could not be used, for people
+  /// for people: parts of the file that could not be used, what is doubtful, what was assumed
+  std::vector<std::string> warnings;
   /// joints whose velocities are but differences of their positions: DifferencedJoints
   std::vector<std::string> differenced = {};
 };

@@ -7,19 +7,19 @@
 
 namespace plumb {
 
-int64_t ReadLog(
-    const std::string& file,
-    const std::function<bool(const std::string&, const void*, int, int64_t)>& on_event) {
+LogEnd ReadLog(const std::string& file,
+               const std::function<bool(const std::string&, const void*, int, int64_t)>& on_event) {
   LcmLogReader log(file);
   LcmLogEvent event;
-  int64_t events = 0;
+  LogEnd end;
   while (log.Read(event)) {
-    ++events;
+    ++end.events;
     const std::span<const uint8_t> message = Unsealed(event.data);
     if (!on_event(event.channel, message.data(), static_cast<int>(message.size()), event.utime))
       break;
   }
-  return events;
+  end.cut_off = log.cut_off();
+  return end;
 }
 
 }  // namespace plumb

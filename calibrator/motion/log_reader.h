@@ -10,16 +10,20 @@ namespace plumb {
 // The functions here share nothing: thread-safe if the given function is, which the caller's thread
 // calls.
 
+/// How far a log was read.
+struct LogEnd {
+  int64_t events = 0;    ///< whole ones
+  bool cut_off = false;  ///< in the middle of an event, where a logger was killed: it ends there
+};
+
 /// Reads an LCM log event by event, in the file's order.
 /// @param on_event channel, data and size of the message without its seal, time of reception [us];
 /// return false to stop.
-/// @return the number of events. A log cut off in the middle of an event (a logger that was killed)
-/// ends there.
 /// @throws std::runtime_error naming the file if it is a folder, cannot be opened or is no LCM log,
 /// or the byte at which it is damaged.
-int64_t ReadLog(const std::string& file,
-                const std::function<bool(const std::string& channel, const void* data, int size,
-                                         int64_t utime)>& on_event);
+LogEnd ReadLog(const std::string& file,
+               const std::function<bool(const std::string& channel, const void* data, int size,
+                                        int64_t utime)>& on_event);
 
 /// Whether it is a message of this type. A hostile one may ask for more memory than there is: then
 /// it is none.

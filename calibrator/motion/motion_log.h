@@ -17,6 +17,7 @@ struct MotionCounts {
   int64_t events = 0;       ///< of all channels
   int64_t messages = 0;     ///< of the three
   int64_t undecodable = 0;  ///< of the three, left out
+  bool cut_off = false;     ///< see LogEnd
 };
 
 /// Hands what an LCM log tells of a robot's motion to a receiver, in the file's order, as a live
@@ -37,7 +38,7 @@ MotionCounts ReadMotion(const std::string& file, Receiver& receiver,
     ++counts.undecodable;
     return false;
   };
-  counts.events =
+  const LogEnd end =
       ReadLog(file, [&](const std::string& channel, const void* data, int size, int64_t) {
         if (channel == "ROBOT_STATE_SMOOTHED") {
           if (decoded(state, data, size)) receiver.OnState(state);
@@ -48,6 +49,7 @@ MotionCounts ReadMotion(const std::string& file, Receiver& receiver,
         }
         return go_on();
       });
+  counts.events = end.events, counts.cut_off = end.cut_off;
   return counts;
 }
 

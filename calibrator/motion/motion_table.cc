@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 
 #include "calibrator/motion/differences.h"
 #include "calibrator/motion/drive_targets.h"
+#include "calibrator/motion/table_units.h"
 #include "common/csv_reader.h"
 #include "common/nearest_name.h"
 #include "common/special_numbers.h"
@@ -170,7 +172,9 @@ class Efforts {
   explicit Efforts(const RobotDescription& robot)
       : task_(MakeTask(robot)),
         limits_(robot.effort_limits()),
-        velocities_(robot.num_velocities()) {}
+        velocities_(robot.num_velocities()),
+        clipped_(robot.driven().size(), 0),
+        known_(clipped_) {}
 
   Eigen::VectorXd operator()(const Eigen::VectorXd& action) {
     Eigen::VectorXd effort = Eigen::VectorXd::Zero(velocities_);
@@ -178,17 +182,34 @@ class Efforts {
       const double asked = action(i) * task_->action_unit(i);
       double& given = effort(task_->action_indices()[static_cast<size_t>(i)]);
       given = std::isnan(asked) ? kNaN : std::clamp(asked, -limits_(i), limits_(i));
-      clipped_ += std::abs(asked) > limits_(i) * kBeyondLimit;
+      clipped_[static_cast<size_t>(i)] += std::abs(asked) > limits_(i) * kBeyondLimit;
+      known_[static_cast<size_t>(i)] += !std::isnan(asked);
     }
     return effort;
   }
-  int64_t clipped() const { return clipped_; }
+
+  std::vector<std::string> Warnings(const Names& names, const RobotDescription& robot) const {
+    std::vector<std::string> warnings;
+    const int64_t clipped = std::accumulate(clipped_.begin(), clipped_.end(), int64_t{0});
+    if (clipped > 0) {
+      warnings.push_back(fmt::format(
+          "{} actions go beyond the effort limits: clipped, as the task does", clipped));
+    }
+    const std::vector<int> driven = robot.driven();
+    for (size_t i = 0; i < clipped_.size(); ++i) {
+      std::string question =
+          AskActionUnit(names.u[i], robot.joints[static_cast<size_t>(driven[i])],
+                        task_->action_unit(static_cast<int>(i)), clipped_[i], known_[i]);
+      if (!question.empty()) warnings.push_back(std::move(question));
+    }
+    return warnings;
+  }
 
  private:
   std::unique_ptr<Task> task_;
   Eigen::VectorXd limits_;
   int velocities_;
-  int64_t clipped_ = 0;
+  std::vector<int64_t> clipped_, known_;  // of each action
 };
 
 /// Quaternions of unit length, each the continuation of the row's before.
@@ -231,9 +252,10 @@ std::vector<MotionRow> ReadRows(CsvReader& table, const Columns& columns,
   return rows;
 }
 
-std::vector<std::string> Warnings(const std::vector<MotionRow>& rows, const Names& names,
-                                  int64_t clipped) {
+std::vector<std::string> Warnings(const std::vector<MotionRow>& rows, const Efforts& efforts,
+                                  const RobotDescription& robot) {
   if (rows.empty()) return {};
+  const Names names(robot);
   std::vector<std::string> states = names.q, still, missing, warnings;
   states.insert(states.end(), names.v.begin(), names.v.end());
   const Eigen::VectorXd spread = Spread(rows);
@@ -246,10 +268,9 @@ std::vector<std::string> Warnings(const std::vector<MotionRow>& rows, const Name
     warnings.push_back(fmt::format("never observed: {}", fmt::join(missing, ", ")));
   if (!still.empty())
     warnings.push_back(fmt::format("the same in all rows: {}", fmt::join(still, ", ")));
-  if (clipped > 0) {
-    warnings.push_back(
-        fmt::format("{} actions go beyond the effort limits: clipped, as the task does", clipped));
-  }
+  for (std::string& warning : efforts.Warnings(names, robot))
+    warnings.push_back(std::move(warning));
+  for (std::string& question : AskStateUnits(rows, robot)) warnings.push_back(std::move(question));
   return warnings;
 }
 
@@ -286,7 +307,7 @@ MotionTable ReadMotionTable(const std::string& file, const RobotDescription& rob
   Efforts efforts(robot);
   MotionTable motion{
       ReadRows(table, columns, robot, efforts), columns.has_next(), columns.has_velocities(), {}};
-  motion.warnings = Warnings(motion.rows, names, efforts.clipped());
+  motion.warnings = Warnings(motion.rows, efforts, robot);
   return motion;
 }
 
@@ -321,7 +342,7 @@ MotionTable MakeMotionTable(const MotionColumns& columns, const RobotDescription
       throw std::invalid_argument(fmt::format("{}, in row {}", fault, i));
     motion.rows.push_back(std::move(row));
   }
-  motion.warnings = Warnings(motion.rows, Names(robot), efforts.clipped());
+  motion.warnings = Warnings(motion.rows, efforts, robot);
   return motion;
 }
 

@@ -8,12 +8,15 @@
 #include <stdexcept>
 
 #include "calibrator/design/excitation.h"
+#include "calibrator/diagnostics/finer_steps.h"
 #include "calibrator/diagnostics/holdout.h"
 #include "calibrator/fit/likelihood_methods.h"
 #include "calibrator/fit/methods.h"
 #include "calibrator/fit/physical_columns.h"
+#include "calibrator/fit/recorded_window.h"
 #include "calibrator/gap/gap.h"
 #include "calibrator/motion/differences.h"
+#include "calibrator/results/summary.h"
 #include "common/time_units.h"
 #include "robot/parameter_distribution.h"
 
@@ -54,14 +57,17 @@ class Calibration {
     findings_.warnings = result.warnings;
     findings_.misspecification = fit.alarm;
     findings_.gap = fit.gap;
-    if (fit.gap.residual) findings_.gap.summary += kCure;
     findings_.diagnostic_steps = fit.simulated_steps;
     mean_ = Moments(result.posterior).mean;
     if (result.curriculum) findings_.stages = result.curriculum->stages;
     TakeOneStep(fit.view);
     FindWhatIsKnown(fit.information);
     CrossValidate(result);
+    if (findings_.gap.residual) findings_.gap.summary += kCure;
+    JudgeSubstep(fit);
     CompareLogs();
+    if (std::string contradiction = Contradiction(findings_, robot_); !contradiction.empty())
+      findings_.warnings.insert(findings_.warnings.begin(), std::move(contradiction));
     findings_.seconds = SecondsSince(start);
     return std::move(findings_);
   }
@@ -173,8 +179,31 @@ class Calibration {
     options.touching = findings_.gap.residual->touching.has_value();
     options.seed = options_.seed;
     const Residual residual = FitResidual(model_, mean, split.fitted, options).residual;
-    if (residual.any())
-      JudgeResidual(model_, residual, split, robot_.ToPhysical(mean), &findings_.holdout);
+    if (!residual.any()) return;
+    JudgeResidual(model_, residual, split, robot_.ToPhysical(mean), &findings_.holdout);
+    const HorizonError& step = findings_.holdout.errors[0];
+    if (step.corrected > step.posterior)
+      LeaveOut(
+          "what was learnt of what it lacks predicts motion that it has not seen worse than the "
+          "model alone, and is left out",
+          &findings_.gap);
+  }
+
+  // Where the model explains the log the longest windows tell most; else single steps, of the fit
+  // to all of it.
+  void JudgeSubstep(const GapFit& fit) {
+    if (!KnowsLikelihood(options_.method)) return;
+    const bool explained = !fit.alarm.alarm && fit.result.curriculum;
+    const std::optional<FinerSteps> finer =
+        explained
+            ? TryFinerSteps(model_, rollouts_, fit.result.curriculum->horizon,
+                            fit.result.curriculum->noise_sd, mean_, options_.execution,
+                            &findings_.diagnostic_steps)
+            : TryFinerSteps(model_, rollouts_, ShortestWindow(rollouts_), fit.view.noise_sd,
+                            fit.view.fit.mode, options_.execution, &findings_.diagnostic_steps);
+    if (!finer) return;
+    const std::string too_long = Judge(*finer, robot_, Moments(findings_.posterior));
+    if (!too_long.empty()) findings_.warnings.push_back(too_long);
   }
 
   // Each log on its own: are they of the same robot?

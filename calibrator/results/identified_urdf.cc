@@ -27,7 +27,7 @@ Toml ReadToml(const RobotDescription& robot) {
   Config root = Config::Load(robot.file);
   Toml toml;
   Config header = root.Table("robot");
-  toml.urdf = (std::filesystem::path(robot.file).parent_path() / header.String("urdf")).string();
+  toml.urdf = FindUrdf(header);
   toml.fixed = header.Strings("fixed", std::vector<std::string>{});
   for (Config& joint : root.Tables("joint")) {
     const std::string name = joint.String("name");

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "common/decompositions.h"
 #include "robot/parameter_distribution.h"
@@ -60,7 +62,29 @@ Eigen::MatrixXd Draw(const Findings& findings, const RobotDescription& robot) {
 }  // namespace
 
 bool Trustworthy(const Findings& findings) {
-  return findings.holdout.better && !findings.misspecification.alarm && findings.agreement.agree;
+  return findings.holdout.better && !findings.misspecification.alarm && findings.agreement.agree &&
+         (DistancesFromPrior(findings).array().abs() <= kContradiction).all();
+}
+
+Eigen::VectorXd DistancesFromPrior(const Findings& findings) {
+  return (Moments(findings.posterior).mean - findings.prior.mean).array() /
+         findings.prior.covariance.diagonal().array().sqrt();
+}
+
+std::string Contradiction(const Findings& findings, const RobotDescription& robot) {
+  const Eigen::VectorXd distances = DistancesFromPrior(findings);
+  std::vector<std::string> far;
+  for (Eigen::Index i = 0; i < distances.size(); ++i) {
+    if (std::abs(distances(i)) <= kContradiction) continue;
+    far.push_back(fmt::format("{} ({:.2g} sd {} than its mean)",
+                              robot.parameters[static_cast<size_t>(i)].name, std::abs(distances(i)),
+                              distances(i) > 0 ? "more" : "less"));
+  }
+  if (far.empty()) return {};
+  return fmt::format(
+      "log and prior contradict each other: {}; are signs and units of the log right, efforts "
+      "above all, or was the prior too sure?",
+      fmt::join(far, ", "));
 }
 
 double Quantile(const std::vector<double>& sorted, double share) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <string>
 
 #include "calibrator/results/findings.h"
 #include "robot/description.h"
@@ -30,8 +31,18 @@ struct Summary {
 Summary Summarise(const Findings& findings, const RobotDescription& robot);
 
 /// Whether findings are to be relied on, as plumb calibrate --strict asks: better than the prior on
-/// motion not seen, no alarm, and the logs agree. Thread-safe.
+/// motion not seen, no alarm, the logs agree, and there is no Contradiction. Thread-safe.
 bool Trustworthy(const Findings& findings);
+
+/// How far the posterior's mean is from the prior's, in the prior's standard deviations of each
+/// coordinate. Thread-safe.
+Eigen::VectorXd DistancesFromPrior(const Findings& findings);
+/// Says which parameters are more than kContradiction standard deviations from the prior's mean:
+/// what fits a log no matter how absurd it is, as where its efforts have the wrong sign, is absurd
+/// itself. Empty if none is. Thread-safe.
+std::string Contradiction(const Findings& findings, const RobotDescription& robot);
+/// One prior of 16 000 that is right is so far from the truth.
+inline constexpr double kContradiction = 4;
 
 /// Quantile of sorted values, linear between them (type 7 of Hyndman and Fan, The American
 /// Statistician 50, 1996).

@@ -4,6 +4,7 @@
 
 #include <stdexcept>
 #include <string_view>
+#include <vector>
 
 #include "drivers/protocols/cansimple_device.h"
 #include "drivers/protocols/cansimple_host.h"
@@ -65,7 +66,19 @@ const SensorProtocol& Of(const SensorDescription& sensor) {
   return Find(kSensors, sensor.protocol, "unknown sensor protocol");
 }
 
+template <class Protocol, size_t count>
+std::vector<std::string> Names(const Protocol (&protocols)[count]) {
+  std::vector<std::string> names;
+  names.reserve(count);
+  for (const Protocol& protocol : protocols) names.emplace_back(protocol.name);
+  return names;
+}
+
 }  // namespace
+
+std::vector<std::string> MotorProtocols() { return Names(kMotors); }
+
+std::vector<std::string> SensorProtocols() { return Names(kSensors); }
 
 std::unique_ptr<Motor> MakeMotor(const MotorDescription& description, const MotorTiming& timing) {
   return Of(description).make(description, timing);

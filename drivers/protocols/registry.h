@@ -14,6 +14,10 @@
 // the driver, the bus plan, the DBC file and the virtual robot find it there. Thread-safe.
 namespace plumb {
 
+/// Names of those that are known here.
+std::vector<std::string> MotorProtocols();
+std::vector<std::string> SensorProtocols();
+
 /// The host's side of a motor (MotorDescription::protocol).
 /// @throws std::invalid_argument for an unknown protocol (the message lists those known), or a node
 /// or settings it cannot have.

@@ -14,7 +14,12 @@ constexpr Range kAnyTarget{-1e9, 1e9}, kLengthOrAngle{0, 1e9};
 
 // A table of joints: `read` is told the key and the joint, and where its coordinates begin.
 template <typename Read>
-void ReadByJoint(Config config, const std::vector<JointDescription>& joints, const Read& read) {
+void ReadByJoint(Config config, const std::vector<JointDescription>& joints,
+                 const std::vector<LinkDescription>& links, const Read& read) {
+  for (const std::string& key : config.Keys()) {
+    if (IsFixedJoint(links, key))
+      config.Fail(key, "is a fixed joint of the URDF: it does not move");
+  }
   size_t at = 0;
   for (const JointDescription& joint : joints) {
     if (config.Has(joint.name)) read(config, joint, at);
@@ -40,7 +45,8 @@ void ReadTarget(Config& config, const JointDescription& joint, double* target) {
 
 }  // namespace
 
-TaskSettings ReadTask(Config config, const std::vector<JointDescription>& joints) {
+TaskSettings ReadTask(Config config, const std::vector<JointDescription>& joints,
+                      const std::vector<LinkDescription>& links) {
   TaskSettings s;
   s.name = config.String("name");
   s.period = config.Number("period", {1e-3, 10});
@@ -50,12 +56,12 @@ TaskSettings ReadTask(Config config, const std::vector<JointDescription>& joints
     s.target.resize(s.target.size() + static_cast<size_t>(joint.num_positions()) - 1);
   }
   s.spread.resize(s.target.size());
-  ReadByJoint(config.Table("target", false), joints,
+  ReadByJoint(config.Table("target", false), joints, links,
               [&](Config& table, const JointDescription& joint, size_t at) {
                 ReadTarget(table, joint, &s.target[at]);
               });
   if (config.IsTable("spread")) {
-    ReadByJoint(config.Table("spread"), joints,
+    ReadByJoint(config.Table("spread"), joints, links,
                 [&](Config& table, const JointDescription& joint, size_t at) {
                   std::fill_n(&s.spread[at], joint.num_positions(),
                               table.Number(joint.name, kLengthOrAngle));
@@ -64,7 +70,7 @@ TaskSettings ReadTask(Config config, const std::vector<JointDescription>& joints
     std::fill(s.spread.begin(), s.spread.end(), config.Number("spread", kLengthOrAngle, 0));
   }
   s.fall.resize(s.target.size());
-  ReadByJoint(config.Table("fall", false), joints,
+  ReadByJoint(config.Table("fall", false), joints, links,
               [&](Config& table, const JointDescription& joint, size_t at) {
                 std::fill_n(&s.fall[at], joint.num_positions(),
                             table.Number(joint.name, kPositive));

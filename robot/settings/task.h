@@ -8,6 +8,7 @@
 namespace plumb {
 
 struct JointDescription;
+struct LinkDescription;
 
 /// [task].
 struct TaskSettings {
@@ -23,7 +24,8 @@ struct TaskSettings {
   std::vector<double> velocity = {0, 0, 0};
 };
 
-/// Thread-safe. @throws ConfigError
-TaskSettings ReadTask(Config config, const std::vector<JointDescription>& joints);
+/// @param links on which what the URDF's fixed joints fix hangs. Thread-safe. @throws ConfigError
+TaskSettings ReadTask(Config config, const std::vector<JointDescription>& joints,
+                      const std::vector<LinkDescription>& links);
 
 }  // namespace plumb

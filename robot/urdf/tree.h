@@ -19,6 +19,11 @@ struct Shape {
   std::vector<Eigen::Vector3d> corners = {};
 };
 
+/// A link of the URDF that a fixed joint makes a part of another.
+struct FixedLink {
+  std::string link, joint;  ///< their names
+};
+
 /// A rigid body. Frames as in URDF: the link frame is at the joint that moves it. What hangs on it
 /// by fixed joints belongs to it. A link may have no mass if links beyond it have.
 struct LinkDescription {
@@ -28,6 +33,7 @@ struct LinkDescription {
   /// [kg m^2], about the centre of mass, link axes
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
   std::vector<Shape> visuals = {}, collisions = {};
+  std::vector<FixedLink> fixed = {};  ///< what hangs on it by fixed joints
 };
 
 /// A moving joint, connecting links[parent] to links[child]. URDF's planar and floating joints are

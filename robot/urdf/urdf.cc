@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
+#include <filesystem>
 #include <map>
 #include <stdexcept>
 #include <utility>
@@ -85,6 +86,7 @@ class ModelReader {
       const UrdfElements::Joint& joint = elements_.joints.at(joint_name);
       const Pose child_pose = pose * joint.origin;
       if (joint.type == "fixed") {
+        model_.links[static_cast<size_t>(index)].fixed.push_back({joint.child, joint_name});
         AddBody(joint.child, index, child_pose);
       } else {
         AddJoint(joint_name, joint, index, child_pose);
@@ -270,6 +272,19 @@ std::vector<std::string> UrdfModel::LoadCollisionMeshes() {
   files.reserve(points_of.size());
   for (const auto& [path, points] : points_of) files.push_back(path);
   return files;
+}
+
+std::string FindUrdf(Config& robot) {
+  namespace fs = std::filesystem;
+  const std::string name = robot.String("urdf");
+  const fs::path beside_key = fs::path(robot.FileOf("urdf")).parent_path() / name,
+                 beside_file = fs::path(robot.file()).parent_path() / name;
+  std::error_code error;
+  for (const fs::path& path : {beside_key, beside_file}) {
+    if (fs::exists(path, error)) return path.string();
+  }
+  robot.Fail("urdf", fmt::format("= \"{}\": there is no such file: {}{}", name, beside_key.string(),
+                                 beside_key == beside_file ? "" : ", " + beside_file.string()));
 }
 
 UrdfModel LoadUrdf(const std::string& file, const std::vector<std::string>& fixed) {

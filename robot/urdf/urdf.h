@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "common/config.h"
 #include "robot/urdf/elements.h"
 #include "robot/urdf/tree.h"
 
@@ -52,6 +53,11 @@ struct UrdfModel {
   /// @throws ConfigError "file:line: what"
   [[noreturn]] void Fail(int line, const std::string& what) const;
 };
+
+/// The path of the URDF that `urdf` in a robot's table [robot] names: relative to the folder of the
+/// file that has the key, or else to that of the file that extends it. Thread-safe but for the
+/// files. @throws ConfigError naming the paths that it has tried.
+std::string FindUrdf(Config& robot);
 
 /// Does not know motors: effort limits may be 0, and links may have no mass.
 /// @throws ConfigError "file:line: ..." for anything missing, unsupported or impossible (an inertia

@@ -20,6 +20,8 @@ struct Contact {
   static constexpr bool kSlides = kRows == 3;
 
   Chain chain;         ///< of what moves it
+  bool any;            ///< active in some lane
+  bool near;           ///< may become so
   Mask<Real> active;   ///< pushes
   Real depth;          ///< [m] where forces are evaluated
   Real pressure;       ///< [N] normal force of the latest trial
@@ -31,8 +33,6 @@ struct Contact {
   Real aside;          ///< [N s/m] and across it per speed, as friction turns with the motion,
   Real across[kRows];  ///< in this direction, of length one
   Real outcome;        ///< [m/s] speed that friction will leave
-  bool any;            ///< active in some lane
-  bool near;           ///< may become so
 
   static Real Length(const Real* vector) {
     Real squared{};

@@ -80,15 +80,15 @@ Eigen::Quaterniond AnyOrientation(Random& random) {
 ReachTask::ReachTask(const RobotDescription& description, const std::string& name)
     : Task(description, ObservationNames(description), StateScale(description)) {
   const TaskSettings& settings = description.task;
-  Eigen::Index q = 0, v = 0;
-  for (const JointDescription& joint : description.joints) {
-    const auto at = static_cast<size_t>(q);
-    const double spread = at < settings.spread.size() ? settings.spread[at] : 0;
+  for (int i = 0; i < description.num_joints(); ++i) {
+    const JointDescription& joint = description.joints[static_cast<size_t>(i)];
     Joint j;
     j.type = joint.type;
-    j.q = q;
-    j.v = v;
+    j.q = description.position_of(i);
+    j.v = description.velocity_of(i);
     j.scale = Scale(joint);
+    const auto at = static_cast<size_t>(j.q);
+    const double spread = at < settings.spread.size() ? settings.spread[at] : 0;
     if (joint.type == Type::kSpherical) {
       if (at + 4 <= settings.target.size()) j.orientation = Quaternion(&settings.target[at]);
       j.lower = -spread;
@@ -112,8 +112,6 @@ ReachTask::ReachTask(const RobotDescription& description, const std::string& nam
       }
     }
     joints_.push_back(j);
-    q += joint.num_positions();
-    v += joint.num_velocities();
   }
 }
 

@@ -12,17 +12,16 @@ Task::Task(const RobotDescription& description, std::vector<std::string> observa
            Eigen::VectorXd state_scale)
     : observation_names_(std::move(observation_names)),
       state_scale_(std::move(state_scale)),
-      effort_limits_(description.effort_limits()) {
-  for (const JointDescription& joint : description.joints) {
-    if (!joint.passive) {
-      if (joint.num_velocities() != 1) {
-        throw std::invalid_argument("joint '" + joint.name +
-                                    "' cannot be driven: one motor turns about one axis");
-      }
-      action_names_.push_back(joint.name);
-      action_indices_.push_back(num_efforts_);
+      effort_limits_(description.effort_limits()),
+      num_efforts_(description.num_velocities()) {
+  for (const int i : description.driven()) {
+    const JointDescription& joint = description.joints[static_cast<size_t>(i)];
+    if (joint.num_velocities() != 1) {
+      throw std::invalid_argument("joint '" + joint.name +
+                                  "' cannot be driven: one motor turns about one axis");
     }
-    num_efforts_ += joint.num_velocities();
+    action_names_.push_back(joint.name);
+    action_indices_.push_back(description.velocity_of(i));
   }
 }
 

@@ -72,7 +72,7 @@ class Task {
   Eigen::VectorXd effort_limits_;
   std::vector<std::string> action_names_;
   std::vector<int> action_indices_;
-  int num_efforts_ = 0;
+  int num_efforts_;
 };
 
 /// The same angle in [-pi, pi).

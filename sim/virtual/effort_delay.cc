@@ -12,11 +12,8 @@ EffortDelay::EffortDelay(const RobotDescription& robot)
       coming_(delay_.size()),
       acting_(Eigen::VectorXd::Zero(robot.num_velocities())) {
   for (const UnmodelledJoint& unmodelled : robot.virtual_robot.joints) {
-    size_t velocity = 0;
-    for (int i = 0; i < unmodelled.joint; ++i) {
-      velocity += static_cast<size_t>(robot.joints[static_cast<size_t>(i)].num_velocities());
-    }
-    delay_[velocity] = Microseconds(unmodelled.delay);
+    delay_[static_cast<size_t>(robot.velocity_of(unmodelled.joint))] =
+        Microseconds(unmodelled.delay);
   }
 }
 

@@ -27,17 +27,12 @@ GearPlay::GearPlay(const RobotDescription& robot) {
       throw std::invalid_argument("joint '" + robot.joints[index].name + "' has backlash: its " +
                                   kind.key + " has no place");
     }
-    Gear gear{.position = 0,
-              .velocity = 0,
-              .half = unmodelled.backlash / 2,
-              .rotor = unmodelled.rotor,
-              .stiffness = robot.joints[index].effort_limit / (kBend * unmodelled.backlash),
-              .damping = 0};
-    for (size_t i = 0; i < index; ++i) {
-      gear.position += robot.joints[i].num_positions();
-      gear.velocity += robot.joints[i].num_velocities();
-    }
-    gears_.push_back(gear);
+    gears_.push_back({.position = robot.position_of(unmodelled.joint),
+                      .velocity = robot.velocity_of(unmodelled.joint),
+                      .half = unmodelled.backlash / 2,
+                      .rotor = unmodelled.rotor,
+                      .stiffness = robot.joints[index].effort_limit / (kBend * unmodelled.backlash),
+                      .damping = 0});
   }
   if (gears_.empty()) return;
   // In the zero pose; elsewhere the teeth are as stiff.

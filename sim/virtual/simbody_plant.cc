@@ -30,10 +30,8 @@ class SimbodyPlant::Impl {
     tree_.system.realizeModel(state_);
     q_ = VectorXd::Zero(robot.num_positions());
     v_ = VectorXd::Zero(robot.num_velocities());
-    int position = 0;
-    for (const JointDescription& joint : joints_) {
-      if (joint.type == Type::kSpherical) q_[position] = 1;
-      position += joint.num_positions();
+    for (int i = 0; i < robot.num_joints(); ++i) {
+      if (joints_[static_cast<size_t>(i)].type == Type::kSpherical) q_[robot.position_of(i)] = 1;
     }
     applied_.resize(static_cast<int>(v_.size()));
   }

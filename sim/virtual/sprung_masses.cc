@@ -12,10 +12,9 @@ constexpr double kPointGyration = 1e-3;  // [m] no engine takes a point
 
 Eigen::VectorXd ZeroPose(const RobotDescription& robot) {
   Eigen::VectorXd q = Eigen::VectorXd::Zero(robot.num_positions());
-  Eigen::Index position = 0;
-  for (const JointDescription& joint : robot.joints) {
-    if (joint.type == JointDescription::Type::kSpherical) q[position] = 1;
-    position += joint.num_positions();
+  for (int i = 0; i < robot.num_joints(); ++i) {
+    if (robot.joints[static_cast<size_t>(i)].type == JointDescription::Type::kSpherical)
+      q[robot.position_of(i)] = 1;
   }
   return q;
 }

@@ -21,12 +21,9 @@ class VirtualDrive : public VirtualDevice {
         limit_(robot.joints[static_cast<size_t>(joint)].effort_limit),
         map_(robot.joints[static_cast<size_t>(joint)].motor),
         encoder_(robot.virtual_robot.encoder_bits),
-        device_(MakeMotorDevice(robot, joint)) {
-    for (int i = 0; i < joint; ++i) {
-      q_index_ += robot.joints[static_cast<size_t>(i)].num_positions();
-      v_index_ += robot.joints[static_cast<size_t>(i)].num_velocities();
-    }
-  }
+        device_(MakeMotorDevice(robot, joint)),
+        q_index_(robot.position_of(joint)),
+        v_index_(robot.velocity_of(joint)) {}
 
   std::vector<Filter> filters() const override { return device_->filters(); }
   bool OnFrame(const Frame& frame, int64_t now) override { return device_->OnFrame(frame, now); }
@@ -68,7 +65,7 @@ class VirtualDrive : public VirtualDevice {
   JointMap map_;
   Encoder encoder_;
   std::unique_ptr<MotorDevice> device_;
-  Eigen::Index q_index_ = 0, v_index_ = 0;
+  Eigen::Index q_index_, v_index_;
 };
 
 }  // namespace

@@ -26,14 +26,9 @@ VirtualRobot::VirtualRobot(const RobotDescription& description, const Eigen::Vec
   for (const int joint : description.driven())
     bus_.push_back(description.joints[static_cast<size_t>(joint)].motor.bus);
   for (const SensorDescription& sensor : description.sensors) bus_.push_back(sensor.bus);
-  std::vector<Eigen::Index> first;  // of the joints in v
-  Eigen::Index next = 0;
-  for (const JointDescription& joint : description.joints) {
-    first.push_back(next);
-    next += joint.num_velocities();
-  }
   for (const auto& device : devices_) {
-    effort_index_.push_back(device->joint() < 0 ? -1 : first[static_cast<size_t>(device->joint())]);
+    const int joint = device->joint();
+    effort_index_.push_back(joint < 0 ? -1 : description.velocity_of(joint));
   }
   Boot(now);
 }

@@ -17,10 +17,8 @@ class VirtualEncoder : public VirtualDevice {
   VirtualEncoder(const RobotDescription& robot, const SensorDescription& sensor)
       : scale_(sensor.sign * sensor.radius),
         offset_(sensor.offset),
-        device_(MakeSensorDevice(sensor)) {
-    for (int i = 0; i < sensor.joint; ++i)
-      index_ += robot.joints[static_cast<size_t>(i)].num_positions();
-  }
+        device_(MakeSensorDevice(sensor)),
+        index_(robot.position_of(sensor.joint)) {}
 
   std::vector<Filter> filters() const override { return device_->filters(); }
   bool OnFrame(const Frame& frame, int64_t now) override {
@@ -39,7 +37,7 @@ class VirtualEncoder : public VirtualDevice {
  private:
   double scale_, offset_;
   std::unique_ptr<SensorDevice> device_;
-  Eigen::Index index_ = 0;
+  Eigen::Index index_;
 };
 
 /// At its link's origin. Its orientation counts from the ground, which it has been levelled on; its

@@ -31,6 +31,20 @@ TEST_CASE("can plan: the hopper's bus, and one that cannot work") {
       Catch::Contains("error: CAN id 0x021: 'thigh' sends Heartbeat and 'imu' sends Quaternion"));
 }
 
+TEST_CASE("an interface's name alone is no bus: the plan says what to write, and so does launch") {
+  const TemporaryFolder folder;
+  const std::string robot = folder / "robot.toml";
+  std::ofstream(robot) << "extends = \"" + Robot("pendulum") +
+                              "/robot.toml\"\n[bus]\nurl = \"can0\"\n";
+  for (const char* command : {"can plan ", "launch "}) {
+    const Outcome refused = Shell(Plumb() + command + robot);
+    INFO(refused.text);
+    CHECK(refused.status == 1);
+    CHECK_THAT(refused.text, Catch::Contains("robot.toml:3:7: bus.url = \"can0\" ") &&
+                                 Catch::Contains("write socketcan:can0"));
+  }
+}
+
 TEST_CASE("of a robot with two buses each has its plan and its DBC file") {
   const std::string robot = Robot("hopper/two_buses.toml");
   const Outcome plan = Shell(Plumb() + "can plan " + robot);

@@ -66,6 +66,25 @@ TEST_CASE("only what is of the kind that is to be written is written over") {
   }
 }
 
+TEST_CASE("what is read to write from a URDF in another folder is not written over, either") {
+  const TemporaryFolder folder;
+  fs::copy(Robot("pendulum"), folder / "base");
+  fs::create_directory(folder.path() / "own");
+  std::ofstream(folder / "own/robot.toml") << "extends = \"../base/robot.toml\"\n";
+  const std::vector<std::string> files = FilesOf(LoadRobot(folder / "own"));
+  REQUIRE(files.size() == 3);
+  CHECK(fs::equivalent(files[2], folder / "base/robot.urdf"));
+}
+
+TEST_CASE("launch: a folder that cannot be made is told as every file is") {
+  const Outcome outcome =
+      Shell(Plumb() + "launch " + Robot("pendulum") + " --bus loop: --output /proc/xx");
+  INFO(outcome.text);
+  CHECK(outcome.status == 1);
+  CHECK_THAT(outcome.text,
+             Catch::Contains("/proc/xx: cannot be written: ") && !Catch::Contains("filesystem"));
+}
+
 TEST_CASE("a recording that cannot be made again is not written over unasked") {
   const TemporaryFolder folder;
   const std::string log = folder / "run.lcmlog", recorded = "\xed\xa1\xda\x01 and so on";

@@ -51,8 +51,10 @@ TEST_CASE("sim: a motor's protocol that there is not is told, though nothing is 
   const Outcome outcome = Sim(folder / "robot.toml --random");
   INFO(outcome.text);
   CHECK(outcome.status == 0);
-  CHECK(outcome.text.find("joint pivot: unknown motor protocol 'cansimpel'; known: cansimple") !=
-        std::string::npos);
+  CHECK_THAT(outcome.text,
+             Catch::Contains("robot.toml:6:12: joint pivot: unknown motor protocol 'cansimpel'; "
+                             "known: cansimple, ") &&
+                 Catch::Contains("pendulum cannot be driven: "));
   CHECK(Sim(Robot("hopper") + " --random").text.find("cannot be driven") == std::string::npos);
 }
 

@@ -282,6 +282,9 @@ TEST_CASE("nonsense is refused with a line that says why") {
   CHECK(outcome.text.find("gets through to nobody") != std::string::npos);
   std::ofstream(folder / "text.json") << "{\"parameters\": 7}";
   refused("--steps 3000 --distribution " + folder / "text.json", "text.json");
+  std::ofstream(folder / "arm.csv") << "t,u/pivot\n";
+  refused("--steps 3000 --distribution " + folder / "arm.csv",
+          "/arm.csv: is no posterior.json: parse error at line 1, column 2: ");
   std::ofstream(folder / "policy.checkpoint") << "rubbish";
   refused("--steps 3000", "policy.checkpoint is not a trainer's checkpoint");
 }

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "plumb/place_robot_t.hpp"
+#include "records/record_folder.h"
 #include "tests/cli/shell.h"
 #include "tests/estimator/observer_errors.h"
 #include "tests/temporary_folder.h"
@@ -15,8 +17,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// @param placed so many samples after one another the robot is placed.
 std::string WriteLog(const TemporaryFolder& folder,
-                     const std::vector<SimulatedReadings::Sample>& samples) {
+                     const std::vector<SimulatedReadings::Sample>& samples, size_t placed = 0) {
   const std::string file = folder / "run.lcmlog";
   lcm::LogFile log(file, "w");
   REQUIRE(log.good());
@@ -30,9 +33,12 @@ std::string WriteLog(const TemporaryFolder& folder,
     event.data = bytes.data();
     REQUIRE(log.writeEvent(&event) == 0);
   };
-  for (const SimulatedReadings::Sample& sample : samples) {
-    for (const imu_t& imu : sample.imus) write("IMU", imu);
-    write("JOINT_STATE", sample.joints);
+  for (size_t i = 0; i < samples.size(); ++i) {
+    place_robot_t place{};
+    place.utime = samples[i].joints.utime;
+    if (placed > 0 && i % placed == 0) write("PLACE_ROBOT", place);
+    for (const imu_t& imu : samples[i].imus) write("IMU", imu);
+    write("JOINT_STATE", samples[i].joints);
   }
   return file;
 }
@@ -67,6 +73,42 @@ TEST_CASE(
   CHECK(tuned.joints[0].noise.jerk > 0);
   const auto fresh = Swing(shipped, 2);
   CHECK(Deviance(tuned, fresh) < Deviance(shipped, fresh) - 0.1);
+}
+
+TEST_CASE("plumb estimate tune does not take for motion that the robot is placed") {
+  const TemporaryFolder folder;
+  constexpr size_t kEpisode = 500;  // samples
+  std::vector<SimulatedReadings::Sample> samples = Swing(LoadRobot(Robot("pendulum")), 1);
+  for (size_t i = 0; i < samples.size(); ++i)  // by less than reset_after
+    samples[i].joints.position[0] += i / kEpisode % 2 == 0 ? 0 : 0.15;
+  const auto position_sd = [&](size_t placed) {
+    const Outcome outcome = Shell(Plumb() + "estimate tune " + Robot("pendulum") + " --log " +
+                                  WriteLog(folder, samples, placed));
+    INFO(outcome.text);
+    REQUIRE(outcome.status == 0);
+    return std::stod(outcome.text.substr(outcome.text.find("position_sd = ") + 14));
+  };
+  CHECK(position_sd(kEpisode) < 0.2 * position_sd(0));
+}
+
+TEST_CASE("plumb estimate tune refuses a log of another robot, and says that one is cut off") {
+  const TemporaryFolder folder;
+  const std::string log = WriteLog(folder, Swing(LoadRobot(Robot("pendulum")), 1));
+  const std::string tune = Plumb() + "estimate tune " + Robot("pendulum") + " --log " + log;
+  RecordFolder(log, {{}, {}, {}, {}, Robot("servo")});
+  const Outcome other = Shell(tune);
+  INFO(other.text);
+  CHECK(other.status == 1);
+  CHECK(other.text.find(log +
+                        ": is a log of servo, not of pendulum: its joint 1 is shaft, not pivot") !=
+        std::string::npos);
+
+  fs::remove_all(log + ".d");
+  fs::resize_file(log, fs::file_size(log) - 1);
+  const Outcome cut = Shell(tune);
+  INFO(cut.text);
+  CHECK(cut.status == 0);
+  CHECK(cut.text.find(log + ": its last message is cut off") != std::string::npos);
 }
 
 TEST_CASE("what does not look whether it is to stop ends at once, and leaves nothing behind") {

@@ -61,6 +61,34 @@ TEST_CASE("a robot moved by hand restarts the filter and flushes the smoother") 
   CHECK(std::abs(smoothed.back().q[0]) < 1e-9);  // untouched by what came after
 }
 
+TEST_CASE("a robot that is placed restarts the filter, however near it is put, and for 50 ms") {
+  StateObserver observer(Robot()), untold(Robot());
+  observer.Place();  // before it has begun it has nothing to forget
+  for (int i = 0; i < 20; ++i) observer.OnJointState(Measured(i, 0));
+  CHECK(observer.restarts() == 0);
+  CHECK(observer.state().valid);
+  for (int i = 0; i < 20; ++i) untold.OnJointState(Measured(i, 0));
+  observer.Place();
+  for (int i = 20; i < 60; ++i) {
+    observer.OnJointState(Measured(i, 0.1, 1));
+    untold.OnJointState(Measured(i, 0.1, 1));
+    INFO(i);
+    CHECK(observer.state().restarted == (i < 30));
+    CHECK_FALSE(untold.state().restarted);
+    if (i < 30) CHECK(observer.state().q[0] == 0.1);
+  }
+  CHECK(observer.state().valid);
+  CHECK(observer.deviance(0) < untold.deviance(0) - 1000);
+
+  observer.Place();
+  joint_state_t back = Measured(61, 0.1);
+  back.utime = back.measured[0] = 500'000;  // a clock that was set back: nothing of it is known
+  observer.OnJointState(back);
+  back.utime = back.measured[0] += 5'000;
+  observer.OnJointState(back);
+  CHECK_FALSE(observer.state().restarted);
+}
+
 TEST_CASE("jumps of time restart it, repeated times and rubbish are refused") {
   StateObserver observer(Robot());
   for (int i = 0; i < 10; ++i) observer.OnJointState(Measured(i, 0));

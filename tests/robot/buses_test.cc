@@ -151,6 +151,18 @@ TEST_CASE("--bus gives the only bus, or one of several by its name, another URL"
   CHECK_THROWS_WITH(SetUrls(two, {""}), StartsWith("--bus "));
 }
 
+TEST_CASE("an interface's name alone is no bus, and what to write is said") {
+  CHECK_THROWS_WITH(
+      LoadZoo(Replaced(kZooToml, "udp:239.74.163.2:43113", "can0")),
+      Contains("robot.toml:5:7: bus.url = \"can0\" ") && Contains("write socketcan:can0"));
+  std::vector<BusDescription> one(1), two(2);
+  two[0].name = "left", two[1].name = "right";
+  CHECK_THROWS_WITH(SetUrls(one, {"can1"}),
+                    StartsWith("--bus can1: ") && Contains("write socketcan:can1"));
+  CHECK_THROWS_WITH(SetUrls(two, {"right=can1"}),
+                    StartsWith("--bus right=can1: ") && Contains("write socketcan:can1"));
+}
+
 TEST_CASE("a file that extends one with one bus may have several") {
   const RobotFolder folder(kZooUrdf, kZooToml);
   const std::string file = folder.path() + "/two.toml";

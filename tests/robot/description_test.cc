@@ -88,6 +88,27 @@ TEST_CASE("what a parameter names in full is not given by one that covers it") {
   CHECK_FALSE(robot.IsUncertain("mass/a/b"));  // a wildcard does not reach beyond a slash
 }
 
+TEST_CASE("a joint's entries of q and v begin behind those of the joints before it") {
+  const RobotDescription quadruped = LoadRobot(kRobots + "/quadruped");
+  REQUIRE(quadruped.num_joints() == 16);
+  REQUIRE(quadruped.joints[3].type == JointDescription::Type::kSpherical);
+  for (int i = 0; i < quadruped.num_joints(); ++i) {
+    CHECK(quadruped.position_of(i) == (i <= 3 ? i : i + 3));
+    CHECK(quadruped.velocity_of(i) == (i <= 3 ? i : i + 2));
+  }
+  CHECK(quadruped.num_positions() == 19);
+  CHECK(quadruped.num_velocities() == 18);
+
+  const RobotDescription hopper = LoadRobot(kRobots + "/hopper");
+  REQUIRE(hopper.num_joints() == 6);
+  for (int i = 0; i < hopper.num_joints(); ++i) {
+    CHECK(hopper.position_of(i) == i);
+    CHECK(hopper.velocity_of(i) == i);
+  }
+  CHECK(hopper.num_positions() == 6);
+  CHECK(hopper.num_velocities() == 6);
+}
+
 TEST_CASE("the hung quadruped is its legs alone") {
   const fs::path folder = fs::path(kPendulum).parent_path() / "quadruped";
   const RobotDescription whole = LoadRobot(folder), hung = LoadRobot(folder / "hung.toml");
@@ -253,7 +274,31 @@ TEST_CASE("mistakes in robot.toml are one line with file, line and field") {
   CHECK_THAT(message("gear = 1.0", "gear = 0.0"), Contains("gear"));
   CHECK_THAT(message("[robot]", "[robot"), Contains("robot.toml:3:"));
   CHECK_THAT(message("robot.urdf\"", "robot.xml\""),
-             Contains("robot.toml:5:8: robot.urdf = \"robot.xml\": there is no such file"));
+             Contains("robot.toml:5:8: robot.urdf = \"robot.xml\": there is no such file: ") &&
+                 EndsWith("/robot.xml") && !Contains("/robot.xml,"));
+}
+
+TEST_CASE("a URDF is beside the file that names it, else beside the one that extends that") {
+  const TemporaryFolder folder;
+  fs::copy(kPendulum, folder / "base");
+  fs::create_directory(folder / "own");
+  const std::string own = folder / "own/robot.toml", urdf = folder / "base/robot.urdf",
+                    beside = folder / "own/robot.urdf";
+  std::ofstream(own) << "extends = \"../base/robot.toml\"\n[task]\nsteps = 7\n";
+  CHECK(LoadRobot(own).task.steps == 7);
+  Config header = Config::Load(own).Table("robot");
+  CHECK(fs::equivalent(FindUrdf(header), urdf));
+  CHECK(fs::path(header.FileOf("urdf")).parent_path().filename() == "base");
+  CHECK(header.FileOf("nothing") == own);
+
+  fs::rename(urdf, beside);
+  CHECK(fs::equivalent(FindUrdf(header), beside));
+  CHECK(LoadRobot(own).num_joints() == 1);
+
+  fs::remove(beside);
+  CHECK_THROWS_WITH(LoadRobot(own), Contains("base/robot.toml:5:8: robot.urdf = \"robot.urdf\": "
+                                             "there is no such file: ") &&
+                                        Contains("/base/robot.urdf, ") && EndsWith(beside));
 }
 
 TEST_CASE("mistakes in robot.urdf name the file and the element") {

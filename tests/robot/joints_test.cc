@@ -212,6 +212,7 @@ TEST_CASE("mistakes about joints are at their lines") {
   Refused("sensor_delay = 0.002", "sensor_delay = 0.51", "sensor_delay = 0.51 is not in [0, 0.5]");
   CHECK_NOTHROW(Load(Replaced(kZooToml, "sensor_delay = 0.002", "sensor_delay = 0.5")));
   Refused("name = \"disc\"", "name = \"free\"", "\"free\" is not a moving joint");
+  Refused("name = \"disc\"", "name = \"weld\"", "name = \"weld\" is fixed: a joint that does not");
   Refused("armature = 0.01", "armature = -0.01", "20:12: joint[0].dynamics.armature");
   Refused("rest = 0.1", "rset = 0.1", "rset is not a known key; did you mean rest?");
   Refused("no_load_speed = 12.0", "no_load_speed = 0.0", "28:17: joint[0].dynamics.no_load_speed");
@@ -227,6 +228,10 @@ TEST_CASE("mistakes about joints are at their lines") {
 
 TEST_CASE("mistakes about targets are at their lines") {
   Refused("hip = 0.5", "hipp = 0.5", "task.target.hipp is not a known key; did you mean hip?");
+  for (const std::string table : {"target", "spread"}) {
+    Refused(table + " = {", table + " = {weld = 0, ",
+            "task." + table + ".weld is a fixed joint of the URDF: it does not move");
+  }
   Refused("hip = 0.5", "hip = 1.6", "task.target.hip = 1.6 is beyond the joint's limits [-1, 1.5]");
   Refused("hip = 0.5", "hip = nan", "task.target.hip");
   Refused("[0.6, 0, 0.8, 0]", "[0.6, 0, 0.7, 0]", "is not a unit quaternion");

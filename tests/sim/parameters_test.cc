@@ -6,6 +6,8 @@
 #include "common/decompositions.h"
 #include "sim/model.h"
 #include "sim/simulator.h"
+#include "tests/replaced.h"
+#include "tests/robot/zoo.h"
 #include "tests/sim/robots.h"
 
 namespace plumb {
@@ -67,6 +69,29 @@ TEST_CASE("an unknown parameter is answered with the nearest known one") {
                     Catch::Contains("[simulation.contact]"));
   CHECK_THROWS_WITH(Model(WithParameters(robot, {"limit/damping"})),
                     Catch::Contains("[simulation.limit]"));
+}
+
+TEST_CASE("a parameter of what is fixed to a link is told to be that link's, with its line") {
+  const auto complaint = [](const std::string& name) {
+    const std::string toml = Replaced(kZooToml, "name = \"mass/thigh\"", "name = \"" + name + "\"");
+    const RobotFolder folder(kZooUrdf,
+                             Replaced(toml, "\"mass/thigh\" = [0.9", "\"" + name + "\" = [0.9"));
+    const RobotDescription robot = LoadRobot(folder.path());
+    try {
+      Model{robot};
+    } catch (const std::invalid_argument& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  CHECK_THAT(complaint("mass/foot"),
+             Catch::Contains("/robot.toml:60:8: [[parameter]]: the simulator has no parameter "
+                             "'mass/foot': foot is fixed to slider: use mass/slider"));
+  CHECK_THAT(complaint("com/foot/z"),
+             Catch::EndsWith(": foot is fixed to slider: use com/slider/z"));
+  CHECK_THAT(complaint("friction/weld"), Catch::EndsWith(": weld is a fixed joint"));
+  CHECK_THAT(complaint("mass/thight"), Catch::Contains("/robot.toml:60:8: ") &&
+                                           Catch::EndsWith("the nearest is 'mass/thigh'"));
 }
 
 TEST_CASE("a parameter with a wildcard is one number for all that it covers but what is named") {

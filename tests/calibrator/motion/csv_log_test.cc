@@ -66,7 +66,8 @@ TEST_CASE(
 }
 
 TEST_CASE("a table whose velocities are differences of its positions is told of") {
-  const RobotDescription robot = Pendulum();
+  RobotDescription robot = Pendulum();
+  robot.simulation.latency = 0;
   std::string csv = "t,q/pivot,v/pivot,u/pivot\n";
   double before = 0;
   for (int k = 0; k < 60; ++k) {
@@ -78,6 +79,23 @@ TEST_CASE("a table whose velocities are differences of its positions is told of"
   CHECK(log.differenced == std::vector<std::string>{"pivot"});
   REQUIRE(log.warnings.size() == 1);
   CHECK_THAT(log.warnings[0], Catch::StartsWith("v/pivot is made of differences"));
+}
+
+TEST_CASE("a table without velocities is told what that means, and of no velocities that it has") {
+  std::string csv = "t,q/pivot,u/pivot\n";
+  for (int k = 0; k < 60; ++k) csv += fmt::format("{},{},0\n", 0.05 * k, std::sin(0.1 * k));
+  const Log log = ReadTable(csv);
+  CHECK(log.differenced == std::vector<std::string>{"pivot"});
+  REQUIRE(log.warnings.size() == 1);
+  CHECK_THAT(log.warnings[0], Catch::StartsWith("has no v/ columns: "));
+}
+
+TEST_CASE("that actions act late is said where they do") {
+  const std::string csv = "t,q/pivot,v/pivot,u/pivot\n0,1,0,0\n0.05,1.1,1,0\n0.1,1.2,2,0\n";
+  CHECK(ReadTable(csv).warnings.empty());
+  CHECK(ReadTable(csv, Pendulum()).warnings ==
+        std::vector<std::string>{"the command of a row acts from 8 ms after it on, as [simulation] "
+                                 "latency says"});
 }
 
 TEST_CASE("an action acts as late as in the simulator that recorded it") {

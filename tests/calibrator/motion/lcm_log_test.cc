@@ -81,6 +81,15 @@ TEST_CASE("a log cut off anywhere counts as far as it goes") {
   CHECK(most < 40);  // states come later than commands
 }
 
+TEST_CASE("that a log is cut off is said, and only then") {
+  Recording r;
+  r.Episode(100, 30, 20);
+  r.States(211, 239);
+  CHECK(ReadLog(r.bytes).warnings.empty());
+  CHECK(ReadLog(r.bytes.substr(0, r.bytes.size() - 1)).warnings ==
+        std::vector<std::string>{"its last message is cut off"});
+}
+
 TEST_CASE("a log of one transition") {
   Recording r;
   r.Command(0, 5, 0);
@@ -185,12 +194,13 @@ TEST_CASE("a log that is of no use is refused with the reason") {
   };
   const std::string none = ": no transition can be used: ";
   const std::vector<Case> cases{
-      {"empty", "",
-       none +
-           "none of its 0 messages is a ROBOT_STATE_SMOOTHED, JOINT_COMMAND or CONTROLLER_STATUS"},
+      {"empty", "", none + "it is empty"},
       {"cut off in the first head", damaged.bytes.substr(0, 20),
-       none +
-           "none of its 0 messages is a ROBOT_STATE_SMOOTHED, JOINT_COMMAND or CONTROLLER_STATUS"},
+       none + "its first message is cut off"},
+      {"cut off in the first message", damaged.bytes.substr(0, 50),
+       none + "its first message is cut off"},
+      {"cut off behind what says nothing", states.bytes.substr(0, states.bytes.size() - 1),
+       none + "it holds no command of an episode; its last message is cut off"},
       {"other channels", other.bytes,
        none +
            "none of its 1 messages is a ROBOT_STATE_SMOOTHED, JOINT_COMMAND or CONTROLLER_STATUS"},

@@ -69,8 +69,8 @@ TEST_CASE("without a folder nothing is recorded, and one that cannot be is an er
   CHECK_FALSE(recorder.Dump(0, 2, "reason"));
   const TemporaryFolder folder;
   std::ofstream(folder.path() / "file") << "x";
-  CHECK_THROWS_AS(FlightRecorder(folder.path() / "file" / "below", {.url = "can0"}, 100, {}),
-                  std::runtime_error);
+  CHECK_THROWS_WITH(FlightRecorder(folder.path() / "file" / "below", {.url = "can0"}, 100, {}),
+                    Catch::EndsWith("/file/below: cannot be written: Not a directory"));
   std::string error;
   {
     FlightRecorder gone(folder.path() / "gone", {.url = "can0"}, 100,

@@ -1,0 +1,117 @@
+#include "calibrator/diagnostics/finer_steps.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "calibrator/fit/robot_least_squares.h"
+#include "calibrator/fit/window_errors.h"
+#include "calibrator/inference/laplace.h"
+#include "common/median.h"
+#include "robot/parameter_distribution.h"
+
+namespace plumb {
+namespace {
+
+constexpr double kBeyond = 5;      // scales: an outlier
+constexpr double kToSd = 1.4826;   // of a normal's median deviation
+constexpr double kMoves = 1;       // [posterior sd]
+constexpr double kExplains = 0.2;  // of the errors' squares
+
+// Columns: the mean, then each coordinate moved.
+Eigen::MatrixXd Moved(const RobotDescription& robot, const Prior& prior,
+                      const Eigen::VectorXd& mean) {
+  Eigen::MatrixXd physical(mean.size(), mean.size() + 1);
+  physical.col(0) = robot.ToPhysical(mean);
+  for (Eigen::Index i = 0; i < mean.size(); ++i) {
+    Eigen::VectorXd moved = mean;
+    moved(i) += kSlopeDifference * prior.marginals()[static_cast<size_t>(i)].b;
+    physical.col(i + 1) = robot.ToPhysical(moved);
+  }
+  return physical;
+}
+
+// 1 / scale of each row's kind, 0 of outliers.
+Eigen::VectorXd Weights(std::span<const WindowErrors::Row> rows, const Eigen::VectorXd& errors,
+                        Eigen::Index coordinates) {
+  std::vector<std::vector<double>> sizes(static_cast<size_t>(coordinates));
+  for (size_t i = 0; i < rows.size(); ++i)
+    sizes[static_cast<size_t>(rows[i].coordinate)].push_back(
+        std::abs(errors(static_cast<Eigen::Index>(i))));
+  std::vector<double> scale;
+  for (std::vector<double>& own : sizes)
+    scale.push_back(own.empty() ? 1 : kToSd * Median(std::move(own)));
+  Eigen::VectorXd weights(errors.size());
+  for (size_t i = 0; i < rows.size(); ++i) {
+    const double s = scale[static_cast<size_t>(rows[i].coordinate)];
+    const auto at = static_cast<Eigen::Index>(i);
+    weights(at) = s > 0 && std::abs(errors(at)) <= kBeyond * s ? 1 / s : 0;
+  }
+  return weights;
+}
+
+}  // namespace
+
+std::optional<FinerSteps> TryFinerSteps(const std::shared_ptr<const Model>& model,
+                                        std::span<const Rollout> rollouts, int horizon,
+                                        const Eigen::VectorXd& noise_sd,
+                                        const Eigen::VectorXd& mean, ExecutionOptions execution,
+                                        int64_t* simulated_steps) {
+  const RobotDescription& robot = model->description();
+  RobotDescription halved = robot;
+  halved.simulation.substep /= 2;
+  WindowErrors coarse(model, rollouts, horizon, execution),
+      fine(std::make_shared<const Model>(halved), rollouts, horizon, execution);
+  const Prior prior = PriorOf(robot);
+  const Eigen::MatrixXd physical = Moved(robot, prior, mean);
+  for (WindowErrors* errors : {&coarse, &fine}) {
+    errors->set_noise_sd(noise_sd);
+    errors->Linearise(physical.col(0));
+  }
+  const Eigen::MatrixXd whitened = coarse.Whitened(physical);
+  const Eigen::VectorXd finer = fine.Whitened(physical.col(0));
+  *simulated_steps += coarse.simulated_steps() + 2 * fine.simulated_steps();
+  if (!whitened.allFinite() || !finer.allFinite()) return std::nullopt;
+
+  const Eigen::VectorXd weights = Weights(coarse.rows(), whitened.col(0), noise_sd.size());
+  const Eigen::VectorXd before = weights.cwiseProduct(whitened.col(0)),
+                        after = weights.cwiseProduct(finer);
+  const Eigen::MatrixXd jacobian = weights.asDiagonal() *
+                                   (whitened.rightCols(mean.size()).colwise() - whitened.col(0)) /
+                                   kSlopeDifference;
+  Eigen::MatrixXd precision = jacobian.transpose() * jacobian;
+  precision.diagonal().array() += 1;
+  FinerSteps result;
+  result.displacement = -precision.llt().solve(jacobian.transpose() * (after - before));
+  result.before = before.squaredNorm();
+  result.after = (after + jacobian * result.displacement).squaredNorm();
+  return result;
+}
+
+std::string Judge(const FinerSteps& finer, const RobotDescription& robot,
+                  const Gaussian& posterior) {
+  if (!finer.credible()) return {};
+  const Eigen::VectorXd moves = finer.displacement.array() *
+                                PriorGaussian(robot).covariance.diagonal().array().sqrt() /
+                                posterior.covariance.diagonal().array().sqrt();
+  Eigen::Index most = 0;
+  const double largest = moves.cwiseAbs().maxCoeff(&most);
+  std::string what;
+  if (largest > kMoves)
+    what = fmt::format("would move {} by {:.2g} of its standard deviations",
+                       robot.parameters[static_cast<size_t>(most)].name, largest);
+  if (finer.explained() > kExplains)
+    what += fmt::format("{}would explain {:.0f} % of the errors' squares",
+                        what.empty() ? "" : ", and ", 100 * finer.explained());
+  if (what.empty()) return {};
+  const bool leaps = robot.simulation.integrator == SimulationSettings::Integrator::kLeapfrog;
+  return fmt::format(
+      "the simulator's steps are too long for this log: half the substep of {:g} s {}; give "
+      "[simulation] a shorter one{}",
+      robot.simulation.substep, what, leaps ? "" : ", or integrator = \"leapfrog\"");
+}
+
+}  // namespace plumb
