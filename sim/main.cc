@@ -19,7 +19,6 @@
 #include "common/seed_range.h"
 #include "common/time_units.h"
 #include "drivers/can/transport.h"
-#include "drivers/protocols/known_protocols.h"
 #include "plumb/place_robot_t.hpp"
 #include "sim/parameters.h"
 #include "sim/tasks/task.h"
@@ -228,7 +227,6 @@ int main(int argc, char** argv) {
       [&](plumb::Process& process) {
         process.BecomeFast(priority);
         plumb::RobotDescription description = plumb::LoadRobot(robot_path);
-        plumb::RequireProtocols(description);
         plumb::SetUrls(description.buses, buses);
         Eigen::VectorXd physical = plumb::HiddenParameters(description, seed);
         for (const std::string& assignment : assignments)

@@ -206,7 +206,7 @@ class Test {
 
 ModelTest TestModel(const TestedFit& fit, ExecutionOptions execution, int64_t* simulated_steps) {
   const Eigen::VectorXd units = MakeTask(fit.model->description())->state_scale();
-  if (LeavesRounding(fit.noise_sd, units, fit.one_step.errors)) {
+  if (LeavesRounding(fit.noise_sd, units, fit.rows, fit.one_step.errors)) {
     ModelTest none{{}, fit.posterior};
     none.found.summary = "the model reproduces this log to five digits";
     return none;

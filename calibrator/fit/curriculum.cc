@@ -309,11 +309,16 @@ CurriculumFit FitCurriculum(std::shared_ptr<const Model> model, std::span<const 
 }
 
 bool LeavesRounding(const Eigen::VectorXd& noise_sd, const Eigen::VectorXd& units,
-                    const Eigen::VectorXd& errors) {
+                    std::span<const WindowErrors::Row> rows, const Eigen::VectorXd& errors) {
   constexpr double kBeyond = 5, kHardlyAny = 0.01;
-  const auto beyond = static_cast<double>((errors.array().abs() > kBeyond).count());
-  return (noise_sd.array() <= kNegligible * units.array()).all() &&
-         beyond <= kHardlyAny * static_cast<double>(errors.size());
+  if ((noise_sd.array() > kNegligible * units.array()).any()) return false;
+  double beyond = 0;
+  for (size_t i = 0; i < rows.size(); ++i) {
+    const int c = rows[i].coordinate;
+    const double error = std::abs(errors(static_cast<Eigen::Index>(i))) * noise_sd(c);
+    beyond += error > kBeyond * kNegligible * units(c);
+  }
+  return beyond <= kHardlyAny * static_cast<double>(rows.size());
 }
 
 }  // namespace plumb

@@ -73,9 +73,9 @@ CurriculumFit FitCurriculum(std::shared_ptr<const Model> model, std::span<const 
 
 /// Whether what a fit has left is rounding: noise of kNegligible at most, and hardly an error
 /// beyond five times that, as the noise's robust estimate may be that of the smaller errors alone.
-/// @param noise_sd of each entry of (q, v). @param units Task::state_scale. @param errors divided
-/// by their scale.
+/// @param noise_sd of each entry of (q, v). @param units Task::state_scale. @param rows of the
+/// errors. @param errors whitened.
 bool LeavesRounding(const Eigen::VectorXd& noise_sd, const Eigen::VectorXd& units,
-                    const Eigen::VectorXd& errors);
+                    std::span<const WindowErrors::Row> rows, const Eigen::VectorXd& errors);
 
 }  // namespace plumb

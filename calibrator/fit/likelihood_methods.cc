@@ -137,7 +137,7 @@ MethodResult Auto(const MethodInput& input) {
   const CurriculumFit& curriculum = *result.curriculum;
   if (!curriculum.others.empty()) return MixtureFrom(input, std::move(result));
   if (LeavesRounding(curriculum.noise_sd, MakeTask(input.model->description())->state_scale(),
-                     curriculum.one_step.errors)) {
+                     curriculum.rows, curriculum.one_step.errors)) {
     result.check =
         "the log is explained to five digits: what is left is rounding, whose likelihood has no "
         "shape to check";

@@ -105,13 +105,18 @@ TEST_CASE("steps of the simulator that are too long are told from a robot that t
 
 TEST_CASE("rounding is left only where hardly an error is more than that") {
   const Eigen::VectorXd units = Eigen::Vector2d(1, 8);
+  std::vector<WindowErrors::Row> rows;
+  for (int i = 0; i < 1000; ++i) rows.push_back({i / 2, 0, i / 2, i % 2});
   Eigen::VectorXd errors = Eigen::VectorXd::LinSpaced(1000, -3, 3);
-  CHECK(LeavesRounding(1e-6 * units, units, errors));
-  CHECK_FALSE(LeavesRounding(1e-4 * units, units, errors));
+  CHECK(LeavesRounding(1e-6 * units, units, rows, errors));
+  CHECK_FALSE(LeavesRounding(1e-4 * units, units, rows, errors));
   errors.head(9).setConstant(1e4);
-  CHECK(LeavesRounding(1e-6 * units, units, errors));
+  CHECK(LeavesRounding(1e-6 * units, units, rows, errors));
   errors.head(300).setConstant(1e4);
-  CHECK_FALSE(LeavesRounding(1e-6 * units, units, errors));
+  CHECK_FALSE(LeavesRounding(1e-6 * units, units, rows, errors));
+  // Rounding has no scale of its own.
+  errors.head(300).setConstant(40);
+  CHECK(LeavesRounding(1e-6 * units, units, rows, errors));
 }
 
 TEST_CASE("a residual that is left out takes its words with it") {
