@@ -90,9 +90,7 @@ class ClosedLoop {
       if (!process_.Wait(kPoll)) {
         line_.Clear();
         processes_.Hurry();
-        std::cout << "interrupted; what was learnt is in " << setting_.output.string()
-                  << ": the same command goes on from there with --output "
-                  << setting_.output.string() << std::endl;
+        std::cout << "interrupted; " << GoesOn() << std::endl;
         return 130;
       }
       if (setting_.virtual_run) setting_.virtual_run->Rethrow();
@@ -193,8 +191,14 @@ class ClosedLoop {
     line_.Clear();
     std::cerr << "plumb: " << ended->name() << " ended (" << ended->ending() << "); the end of "
               << ended->log().string() << ":\n"
-              << ended->Tail(5);
+              << ended->Tail(5) << "plumb: " << GoesOn() << "\n";
     return false;
+  }
+
+  std::string GoesOn() const {
+    const std::string output = setting_.output.string();
+    return "what was learnt is in " + output +
+           ": the same command goes on from there with --output " + output;
   }
 
   // A virtual robot is armed at the beginning, and again after a fault, though not for ever. What a

@@ -48,12 +48,12 @@ std::string OrDash(double value) {
   return std::isfinite(value) ? fmt::format("{:.0f}", value) : "-";
 }
 
-// Width in terminal cells: UTF-8 continuation bytes take none.
+// Width in terminal cells: UTF-8 continuation bytes take none. What is wider keeps one blank.
 std::string Pad(const std::string& text, size_t width) {
   const auto cells = static_cast<size_t>(std::count_if(text.begin(), text.end(), [](char c) {
     return (static_cast<unsigned char>(c) & 0xc0) != 0x80;
   }));
-  return cells < width ? std::string(width - cells, ' ') + text : text;
+  return std::string(cells < width ? width - cells : 1, ' ') + text;
 }
 
 std::string Title(const ParameterDescription& parameter) {

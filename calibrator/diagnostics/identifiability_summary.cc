@@ -155,6 +155,9 @@ std::string IdentifiabilitySummary(const RobotDescription& robot, const Eigen::V
   } else if (!found.null.empty()) {
     summary = found.combinations.empty() ? "nothing can be known from this motion"
                                          : "every other parameter is determined by this motion";
+  } else if (std::any_of(found.weak.begin(), found.weak.end(),
+                         [](const WeakDirection& weak) { return Single(weak.direction) >= 0; })) {
+    summary = "every other parameter is determined by this motion";
   }
   return summary + Coupled(robot, mean, found) + WithoutEffect(robot, found) +
          Weak(robot, mean, found);

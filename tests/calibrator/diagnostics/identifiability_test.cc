@@ -128,6 +128,7 @@ TEST_CASE("what is hardly determined is told, with what is left of the prior's s
     CHECK(found.weak[0].sd_ratio == Approx(1 / std::sqrt(1.16)));
     CHECK_THAT(found.summary,
                Catch::Contains("a2 is hardly determined: posterior sd is 93 % of the prior's"));
+    CHECK_THAT(found.summary, Catch::StartsWith("every other parameter is determined"));
     CHECK(found.cramer_rao(2) == Approx(std::sqrt(variance / 0.16)));
   }
   SECTION("a direction") {
