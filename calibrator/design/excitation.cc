@@ -222,8 +222,8 @@ std::vector<RatedExcitation> RateExcitations(const RobotDescription& robot, cons
     throw std::invalid_argument(robot.name + " has no motor to excite it");
   Rater rater(robot, belief, settings);
   std::vector<RatedExcitation> rated;
-  for (Excitation& excitation : MakeExcitations(robot, settings)) {
-    if (auto one = rater.Rate(std::move(excitation))) rated.push_back(*std::move(one));
+  for (const Excitation& excitation : MakeExcitations(robot, settings)) {
+    if (auto one = rater.Rate(excitation)) rated.push_back(*std::move(one));
   }
   std::stable_sort(
       rated.begin(), rated.end(),

@@ -42,6 +42,7 @@ Eigen::VectorXd Weights(std::span<const WindowErrors::Row> rows, const Eigen::Ve
     sizes[static_cast<size_t>(rows[i].coordinate)].push_back(
         std::abs(errors(static_cast<Eigen::Index>(i))));
   std::vector<double> scale;
+  scale.reserve(sizes.size());
   for (std::vector<double>& own : sizes)
     scale.push_back(own.empty() ? 1 : kToSd * Median(std::move(own)));
   Eigen::VectorXd weights(errors.size());

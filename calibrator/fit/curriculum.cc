@@ -231,7 +231,8 @@ class Curriculum {
 
   // Root mean square error of each entry of (q, v), in units of the noise as it is assumed.
   static Eigen::VectorXd Whitened(const WindowErrors& errors, const LaplaceFit& fit) {
-    Eigen::VectorXd squares = Eigen::VectorXd::Zero(2 * errors.num_velocities()), rows = squares;
+    Eigen::VectorXd squares = Eigen::VectorXd::Zero(Eigen::Index{2} * errors.num_velocities()),
+                    rows = squares;
     for (Eigen::Index i = 0; i < fit.errors.size(); ++i) {
       const int c = errors.rows()[static_cast<size_t>(i)].coordinate;
       squares(c) += std::pow(fit.errors(i) * fit.scale(c), 2);
