@@ -11,12 +11,11 @@
 
 #include "calibrator/motion/differences.h"
 #include "calibrator/motion/drive_targets.h"
+#include "calibrator/motion/table_columns.h"
 #include "calibrator/motion/table_units.h"
 #include "common/csv_reader.h"
-#include "common/nearest_name.h"
 #include "common/special_numbers.h"
 #include "robot/configuration_space.h"
-#include "robot/coordinate_names.h"
 #include "robot/physical.h"
 #include "sim/tasks/task.h"
 
@@ -25,113 +24,6 @@ namespace {
 
 constexpr double kLatest = 1e12;           // [s]; Unix time in nanoseconds is none
 constexpr double kBeyondLimit = 1 + 1e-9;  // an effort so far beyond its limit is not just rounded
-
-std::vector<std::string> Prefixed(const char* prefix, std::vector<std::string> names) {
-  for (std::string& name : names) name.insert(0, prefix);
-  return names;
-}
-
-/// The columns' names, in the order of q, v and the actions.
-struct Names {
-  std::vector<std::string> q, v, u, target, kp, kd;
-
-  explicit Names(const RobotDescription& robot) {
-    const CoordinateNames names(robot);
-    q = Prefixed("q/", names.q), v = Prefixed("v/", names.v);
-    for (const JointDescription& joint : robot.joints) {
-      if (joint.passive) continue;
-      u.push_back("u/" + joint.name), target.push_back("target_q/" + joint.name);
-      kp.push_back("kp/" + joint.name), kd.push_back("kd/" + joint.name);
-    }
-  }
-};
-
-/// Where things are in a table; -1 if there is no such column.
-struct Columns {
-  int t, terminated, truncated;
-  std::vector<int> q, v;
-  std::vector<int> u, target, kp, kd;  // of each driven joint
-  std::vector<int> next_q, next_v;
-  bool has_velocities() const { return !v.empty(); }
-  bool has_next() const { return !next_q.empty(); }
-};
-
-std::vector<int> FindAll(const CsvReader& table, const std::vector<std::string>& names) {
-  std::vector<int> columns;
-  for (const std::string& name : names) {
-    columns.push_back(table.Find(name));
-    if (columns.back() < 0) {
-      table.Fail(fmt::format("has no column '{}'; the nearest is {}", name,
-                             Quoted(NearestName(name, table.names()))));
-    }
-  }
-  return columns;
-}
-
-bool OfMotor(const std::string& column) {
-  return !column.starts_with("q/") && !column.starts_with("v/") && !column.starts_with("next_");
-}
-
-// A column that looks like a joint's but is of none of this robot's is of another robot, or
-// misspelt: its values would be ignored in silence.
-void RefuseForeign(const CsvReader& table, const std::vector<std::string>& known,
-                   const std::string& robot) {
-  constexpr const char* kPrefixes[] = {"q/",  "v/",  "u/",      "next_q/",
-                                       "kp/", "kd/", "next_v/", "target_q/"};
-  for (const std::string& name : table.names()) {
-    const bool of_a_joint =
-        std::any_of(std::begin(kPrefixes), std::end(kPrefixes),
-                    [&](const char* prefix) { return name.starts_with(prefix); });
-    if (of_a_joint && std::find(known.begin(), known.end(), name) == known.end()) {
-      table.Fail(fmt::format("column {} is of no joint{} of robot '{}'; the nearest is '{}'",
-                             Quoted(name), OfMotor(name) ? " with a motor" : "", robot,
-                             NearestName(name, known)));
-    }
-  }
-}
-
-std::vector<int> FindAny(const CsvReader& table, const std::vector<std::string>& names) {
-  std::vector<int> columns;
-  columns.reserve(names.size());
-  for (const std::string& name : names) columns.push_back(table.Find(name));
-  return columns;
-}
-
-bool HasAny(const CsvReader& table, const std::vector<std::string>& names) {
-  return std::ranges::any_of(FindAny(table, names), [](int column) { return column >= 0; });
-}
-
-Columns FindColumns(const CsvReader& table, const Names& names, const std::string& robot) {
-  const std::vector<std::string> next_q = Prefixed("next_", names.q),
-                                 next_v = Prefixed("next_", names.v);
-  std::vector<std::string> known;
-  for (const auto* some :
-       {&names.q, &names.v, &names.u, &names.target, &names.kp, &names.kd, &next_q, &next_v}) {
-    known.insert(known.end(), some->begin(), some->end());
-  }
-  RefuseForeign(table, known, robot);
-  Columns columns{FindAll(table, {"t"})[0],
-                  table.Find("terminated"),
-                  table.Find("truncated"),
-                  FindAll(table, names.q),
-                  {},
-                  FindAny(table, names.u),
-                  FindAny(table, names.target),
-                  FindAny(table, names.kp),
-                  FindAny(table, names.kd),
-                  {},
-                  {}};
-  for (size_t i = 0; i < columns.u.size(); ++i) {
-    if (columns.u[i] < 0 && columns.target[i] < 0) FindAll(table, {names.u[i]});  // says what lacks
-  }
-  const bool has_next = HasAny(table, next_q) || HasAny(table, next_v);
-  if (has_next || HasAny(table, names.v)) columns.v = FindAll(table, names.v);
-  if (has_next) {
-    columns.next_q = FindAll(table, next_q);
-    columns.next_v = FindAll(table, next_v);
-  }
-  return columns;
-}
 
 double Number(const CsvReader& table, int column, double greatest = kGreatestQuantity) {
   const double number = table.Number(column);
@@ -188,7 +80,7 @@ class Efforts {
     return effort;
   }
 
-  std::vector<std::string> Warnings(const Names& names, const RobotDescription& robot) const {
+  std::vector<std::string> Warnings(const ColumnNames& names, const RobotDescription& robot) const {
     std::vector<std::string> warnings;
     const int64_t clipped = std::accumulate(clipped_.begin(), clipped_.end(), int64_t{0});
     if (clipped > 0) {
@@ -224,7 +116,7 @@ std::string Normalise(const ConfigurationSpace& space, const std::vector<MotionR
   return fault.empty() ? fault : "next_q " + fault;
 }
 
-std::vector<MotionRow> ReadRows(CsvReader& table, const Columns& columns,
+std::vector<MotionRow> ReadRows(CsvReader& table, const TableColumns& columns,
                                 const RobotDescription& robot, Efforts& efforts) {
   const ConfigurationSpace space(robot);
   const DriveTargets targets(table, robot, columns.target, columns.kp, columns.kd);
@@ -255,7 +147,7 @@ std::vector<MotionRow> ReadRows(CsvReader& table, const Columns& columns,
 std::vector<std::string> Warnings(const std::vector<MotionRow>& rows, const Efforts& efforts,
                                   const RobotDescription& robot) {
   if (rows.empty()) return {};
-  const Names names(robot);
+  const ColumnNames names(robot);
   std::vector<std::string> states = names.q, still, missing, warnings;
   states.insert(states.end(), names.v.begin(), names.v.end());
   const Eigen::VectorXd spread = Spread(rows);
@@ -302,8 +194,8 @@ class CheckedColumns {
 
 MotionTable ReadMotionTable(const std::string& file, const RobotDescription& robot) {
   CsvReader table(file);
-  const Names names(robot);
-  const Columns columns = FindColumns(table, names, robot.name);
+  const ColumnNames names(robot);
+  const TableColumns columns = FindColumns(table, names, robot.name);
   Efforts efforts(robot);
   MotionTable motion{
       ReadRows(table, columns, robot, efforts), columns.has_next(), columns.has_velocities(), {}};
