@@ -145,8 +145,8 @@ bool StateObserver::Back(const joint_state_t& measured) const {
 }
 
 void StateObserver::RestartAll(const joint_state_t& measured) {
-  if (base_) base_->Restart();
   RestartJoints(measured);
+  if (base_) base_->Restart();  // last: what waits is still smoothed
 }
 
 void StateObserver::RestartJoints(const joint_state_t& measured) {

@@ -237,6 +237,30 @@ TEST_CASE("a leg's encoder that comes back in mid-air does not bring its base to
   CHECK(errors.base[1].nees_v() < 3);
 }
 
+TEST_CASE("what waits to be smoothed when all begins anew has its base smoothed, too") {
+  const RobotDescription robot = Free();
+  const auto recording = HopUpright(robot, 3);
+  StateObserver observer(robot);
+  std::vector<robot_state_t> causal;
+  for (size_t k = 0; k < 900; ++k) {
+    for (const imu_t& imu : recording[k].imus) observer.OnImu(imu);
+    REQUIRE(observer.OnJointState(recording[k].joints));
+    causal.push_back(observer.state());
+  }
+  joint_state_t later = recording[900].joints;
+  later.utime += 2'000'000;  // a gap after which nothing is known
+  for (int64_t& measured : later.measured) measured += 2'000'000;
+  REQUIRE(observer.OnJointState(later));
+  REQUIRE(observer.state().restarted);
+  const auto smoothed = observer.smoothed();
+  REQUIRE(smoothed.size() > 10);
+  const robot_state_t& first = smoothed.front();
+  const robot_state_t& before = causal[causal.size() - smoothed.size()];
+  REQUIRE(first.sequence == before.sequence);
+  CHECK(first.v[1] != before.v[1]);
+  CHECK(first.v_sd[1] < before.v_sd[1]);
+}
+
 TEST_CASE("noise is learnt of the legs' joints, the base's are left alone") {
   const RobotDescription robot = Free();
   const Recordings recordings = {HopUpright(robot, 11)};
