@@ -57,7 +57,8 @@ policy_t Train(Stage& stage, const std::vector<Forgery>& forgeries) {
     REQUIRE(trainer.running());
     REQUIRE(came);
   };
-  wait([&] { return trainings.received() > 0; });
+  // Its own, not the last words of a trainer that was killed, which may still be on their way.
+  wait([&] { return trainings.received() > 0 && trainings.newest().update == 0; });
   for (const Forgery& forgery : forgeries) {
     INFO(forgery.refusal);
     distributions.Publish(forgery.message);
@@ -70,7 +71,7 @@ policy_t Train(Stage& stage, const std::vector<Forgery>& forgeries) {
     if (std::exchange(update, trainings.newest().update) != trainings.newest().update) {
       for (const Forgery& forgery : forgeries) distributions.Publish(forgery.message);
     }
-    return policies.received() > 0;
+    return policies.received() > 0 && trainings.newest().complete;
   });
   for (const Forgery& forgery : forgeries) {
     INFO(forgery.refusal);
