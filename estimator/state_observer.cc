@@ -305,11 +305,12 @@ bool StateObserver::OnJointState(const joint_state_t& measured) {
   bool moved = false;
   for (Imu& imu : imus_) {
     while (const ImuInbox::Reading* reading = imu.inbox.Take(measured.utime)) {
-      if (!restarted) moved = UseImu(imu, *reading, measured) || moved;
+      const bool used = !restarted || (back && imu.of_base);  // a base goes on as it is
+      if (used) moved = UseImu(imu, *reading, measured) || moved;
     }
   }
   const auto sound = [](const Joint& joint) { return joint.filter.sound(); };
-  if (!restarted && (moved || !std::all_of(joints_.begin(), joints_.end(), sound))) {
+  if (!anew && (moved || !std::all_of(joints_.begin(), joints_.end(), sound))) {
     RestartAll(measured);
     restarted = true;
   }

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <limits>
 #include <stdexcept>
+#include <system_error>
 
 namespace plumb {
 namespace {
@@ -13,13 +14,14 @@ constexpr int64_t kBetweenPlaces = 1000;  // messages
 }  // namespace
 
 LogIndex::LogIndex(LcmLogReader& log, const std::function<void(double)>& progress) {
-  const auto size = static_cast<double>(std::filesystem::file_size(log.file()));
+  std::error_code error;  // of what is no file, or gone: then nobody is told
+  const auto size = static_cast<double>(std::filesystem::file_size(log.file(), error));
   log.Seek(0);
   int64_t latest = std::numeric_limits<int64_t>::min(), utime = 0;
   for (;;) {
     if (messages_ % kBetweenPlaces == 0) {
       places_.push_back({log.position(), latest});
-      if (progress) progress(std::min(1., static_cast<double>(log.position()) / size));
+      if (progress && !error) progress(std::min(1., static_cast<double>(log.position()) / size));
     }
     if (!log.Skip(utime)) break;
     if (messages_++ == 0) begin_ = utime;

@@ -54,8 +54,8 @@ struct JointDescription : JointGeometry {
 /// Whether the motor's protocol needs a bus that carries CAN FD. Thread-safe.
 bool NeedsFd(const MotorDescription& motor);
 
-/// Whether that is a joint of the URDF that does not move, by which something hangs on one of the
-/// links. Thread-safe.
+/// Whether that is a joint that does not move, as the URDF or robot.toml has it, by which something
+/// hangs on one of the links. Thread-safe.
 bool IsFixedJoint(const std::vector<LinkDescription>& links, const std::string& name);
 
 /// The URDF's joints as they are without robot.toml: none passive, no motor known. Thread-safe.

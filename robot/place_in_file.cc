@@ -13,9 +13,9 @@ std::string PlaceInFile(const RobotDescription& robot, const std::string& table,
       if (entry.String("name") == name) return entry.Position(key);
     }
   } catch (const ConfigError&) {
-    // It has changed since, which is not what is complained of.
+    return robot.file + ": ";  // it has changed since, which is not what is complained of
   }
-  return robot.file + ": ";
+  return "";
 }
 
 }  // namespace plumb

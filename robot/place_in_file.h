@@ -7,8 +7,9 @@
 namespace plumb {
 
 /// "file:line:column: " of `key` in the entry of that name of the robot's [[table]], for what is
-/// found to be wrong only when the robot has been read. "file: " if the file has no such entry;
-/// empty if the robot is of no file. Reads the file again. Thread-safe but for the files.
+/// found to be wrong only when the robot has been read. Empty if the file has no such entry, or
+/// there is no file; "file: " if it cannot be read any more. Reads the file again. Thread-safe but
+/// for the files.
 std::string PlaceInFile(const RobotDescription& robot, const std::string& table,
                         const std::string& name, const std::string& key);
 

@@ -137,15 +137,14 @@ std::vector<Misfit> TestOutliers(const ProjectedErrors& errors) {
       Rows out;
       std::copy_if(rows.begin(), rows.end(), std::back_inserter(out),
                    [&](Eigen::Index i) { return errors.outlying[static_cast<size_t>(i)]; });
-      const auto again = std::ranges::count_if(
-          out, [&](Eigen::Index i) { return errors.repeated[static_cast<size_t>(i)]; });
-      const auto count = static_cast<double>(out.size()) - static_cast<double>(again),
-                 all = static_cast<double>(rows.size());
+      const auto counted = std::ranges::count_if(
+          out, [&](Eigen::Index i) { return !errors.repeated[static_cast<size_t>(i)]; });
+      const auto count = static_cast<double>(counted), all = static_cast<double>(rows.size());
       const double p =
           count == 0 ? 1 : cdf(complement(boost::math::poisson(all * expected), count - 1));
       const std::string& name = errors.joint_of[static_cast<size_t>(joint)];
-      const std::string many = std::to_string(out.size()) + " of " + std::to_string(rows.size()) +
-                               " errors are outliers";
+      const std::string many =
+          std::to_string(counted) + " of " + std::to_string(rows.size()) + " errors are outliers";
       tests.push_back({errors.Place(name, condition) + ": " + many, name, condition, "outliers",
                        count / all, p, SumOfSquares(errors, out) / SumOfSquares(errors, rows)});
     }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include "calibrator/diagnostics/projected_errors.h"
 #include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/fit/window_errors.h"
 #include "calibrator/inference/laplace.h"
@@ -16,10 +17,9 @@
 namespace plumb {
 namespace {
 
-constexpr double kBeyond = 5;      // scales: an outlier
-constexpr double kToSd = 1.4826;   // of a normal's median deviation
-constexpr double kMoves = 1;       // [posterior sd]
-constexpr double kExplains = 0.2;  // of the errors' squares
+constexpr double kToSd = 1.4826;          // of a normal's median deviation
+constexpr double kMovedTooFar = 1;        // [posterior sd]
+constexpr double kExplainsTooMuch = 0.2;  // of the errors' squares
 
 // Columns: the mean, then each coordinate moved.
 Eigen::MatrixXd Moved(const RobotDescription& robot, const Prior& prior,
@@ -34,7 +34,7 @@ Eigen::MatrixXd Moved(const RobotDescription& robot, const Prior& prior,
   return physical;
 }
 
-// 1 / scale of each row's kind, 0 of outliers.
+// 1 / scale of the errors of each row's coordinate, 0 of outliers.
 Eigen::VectorXd Weights(std::span<const WindowErrors::Row> rows, const Eigen::VectorXd& errors,
                         Eigen::Index coordinates) {
   std::vector<std::vector<double>> sizes(static_cast<size_t>(coordinates));
@@ -49,7 +49,7 @@ Eigen::VectorXd Weights(std::span<const WindowErrors::Row> rows, const Eigen::Ve
   for (size_t i = 0; i < rows.size(); ++i) {
     const double s = scale[static_cast<size_t>(rows[i].coordinate)];
     const auto at = static_cast<Eigen::Index>(i);
-    weights(at) = s > 0 && std::abs(errors(at)) <= kBeyond * s ? 1 / s : 0;
+    weights(at) = s > 0 && std::abs(errors(at)) <= kOutlier * s ? 1 / s : 0;
   }
   return weights;
 }
@@ -92,8 +92,8 @@ std::optional<FinerSteps> TryFinerSteps(const std::shared_ptr<const Model>& mode
   return result;
 }
 
-std::string Judge(const FinerSteps& finer, const RobotDescription& robot,
-                  const Gaussian& posterior) {
+std::string WhyTooLong(const FinerSteps& finer, const RobotDescription& robot,
+                       const Gaussian& posterior) {
   if (!finer.credible()) return {};
   const Eigen::VectorXd moves = finer.displacement.array() *
                                 PriorGaussian(robot).covariance.diagonal().array().sqrt() /
@@ -101,10 +101,10 @@ std::string Judge(const FinerSteps& finer, const RobotDescription& robot,
   Eigen::Index most = 0;
   const double largest = moves.cwiseAbs().maxCoeff(&most);
   std::string what;
-  if (largest > kMoves)
+  if (largest > kMovedTooFar)
     what = fmt::format("would move {} by {:.2g} of its standard deviations",
                        robot.parameters[static_cast<size_t>(most)].name, largest);
-  if (finer.explained() > kExplains)
+  if (finer.explained() > kExplainsTooMuch)
     what += fmt::format("{}would explain {:.0f} % of the errors' squares",
                         what.empty() ? "" : ", and ", 100 * finer.explained());
   if (what.empty()) return {};

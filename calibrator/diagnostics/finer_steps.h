@@ -33,7 +33,7 @@ struct FinerSteps {
 
 /// A robot does not move in steps, and a simulator whose substeps are too long differs from it as
 /// one with wrong parameters does. Simulates the windows of a fit with half the substep, in one
-/// Gauss-Newton step. Errors beyond five times the scale do not count.
+/// Gauss-Newton step. Errors beyond kOutlier times the scale do not count.
 /// @param horizon of the windows. @param noise_sd of each entry of (q, v) where the record does not
 /// say. @param mean of the fit, coordinates. @return nothing if a simulator fails. Threads as
 /// `execution` says. Thread-safe.
@@ -46,7 +46,7 @@ std::optional<FinerSteps> TryFinerSteps(const std::shared_ptr<const Model>& mode
 /// Why the substep is too long, for people: the posterior's mean would move by more than its
 /// standard deviation, or a fifth of the errors' squares would be gone. Empty if it is not.
 /// @param posterior moments, coordinates.
-std::string Judge(const FinerSteps& finer, const RobotDescription& robot,
-                  const Gaussian& posterior);
+std::string WhyTooLong(const FinerSteps& finer, const RobotDescription& robot,
+                       const Gaussian& posterior);
 
 }  // namespace plumb

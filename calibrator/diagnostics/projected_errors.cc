@@ -164,17 +164,22 @@ void ProjectedErrors::Weigh(const Eigen::VectorXd& errors) {
 }
 
 void ProjectedErrors::FindRepeated() {
-  std::vector<bool> spoilt(steps.size(), false), again(steps.size(), false);
-  for (size_t i = 0; i < outlying.size(); ++i) {
-    if (outlying[i]) spoilt[static_cast<size_t>(step_of[i])] = true;
+  repeated.assign(outlying.size(), false);
+  for (int joint = 0; joint < n; ++joint) {
+    std::vector<bool> spoilt(steps.size(), false), again(steps.size(), false);
+    const auto own = [&](size_t row) { return outlying[row] && coordinate[row] % n == joint; };
+    for (size_t i = 0; i < outlying.size(); ++i) {
+      if (own(i)) spoilt[static_cast<size_t>(step_of[i])] = true;
+    }
+    for (size_t i = 0; i < steps.size(); ++i) {
+      if (!spoilt[i] || again[i] || !steps[i].shares_state) continue;
+      const auto next = static_cast<size_t>(steps[i].next);
+      again[next] = spoilt[next];
+    }
+    for (size_t i = 0; i < outlying.size(); ++i) {
+      if (own(i)) repeated[i] = again[static_cast<size_t>(step_of[i])];
+    }
   }
-  for (size_t i = 0; i < steps.size(); ++i) {
-    if (!spoilt[i] || again[i] || !steps[i].shares_state) continue;
-    const auto next = static_cast<size_t>(steps[i].next);
-    again[next] = spoilt[next];
-  }
-  for (size_t i = 0; i < outlying.size(); ++i)
-    repeated.push_back(outlying[i] && again[static_cast<size_t>(step_of[i])]);
 }
 
 std::string ProjectedErrors::Place(const std::string& joint, const std::string& condition) const {

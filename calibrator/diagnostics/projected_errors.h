@@ -44,8 +44,9 @@ struct ProjectedErrors {
   std::vector<int> coordinate;  ///< of each row
   /// of each row: beyond kOutlier robust sd of its coordinate and condition
   std::vector<bool> outlying;
-  /// Of each row: outlying, and so was the step before, which ended with the reading that this one
-  /// begins with: a bad reading spoils both, and counts once.
+  /// Of each row: outlying, and so was the joint in the step before, which ended with the reading
+  /// that this one begins with: a bad reading spoils both, and counts once. Of a run of outlying
+  /// steps every second one is repeated.
   std::vector<bool> repeated;
   /// Of each coordinate: its noise is said to be known, and the errors are significantly smaller
   /// than that.

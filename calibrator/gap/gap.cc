@@ -88,19 +88,19 @@ std::string InWords(const char* where, const ResidualQuality& quality) {
                      where, 100 * MeanExplained(quality));
 }
 
-std::string Unexplained(bool free, bool touching, const Gap& gap) {
+std::string Unexplained(bool free, bool touching, Informed by) {
   const char* what = !free      ? "does not explain contact"
                      : touching ? "explains neither free motion nor contact"
                                 : "does not explain the motion";
-  const char* informed = gap.informed == Informed::kNone ? "nothing informs its parameters"
-                         : gap.informed == Informed::kFree
+  const char* informed = by == Informed::kNone ? "nothing informs its parameters"
+                         : by == Informed::kFree
                              ? "its parameters are learnt from free motion alone"
                              : "its parameters are learnt from what contacts cannot have done";
   return fmt::format("the model {}: {}", what, informed);
 }
 
-std::string Summarise(bool free, bool touching, const Gap& gap) {
-  std::string text = Unexplained(free, touching, gap);
+std::string Summarise(const Gap& gap) {
+  std::string text = gap.unexplained;
   if (!gap.residual) return text + "; too little was recorded to learn what it lacks";
   text += "; of what it lacks, the learnt residual explains, of ";
   std::string parts;
@@ -222,9 +222,9 @@ Eigen::VectorXd Explained(const ResidualQuality& quality) {
 }
 
 void LeaveOut(const std::string& why, Gap* gap) {
-  const bool free = gap->residual->free.has_value(), touching = gap->residual->touching.has_value();
   gap->residual = nullptr;
-  gap->summary = Unexplained(free, touching, *gap) + "; " + why;
+  gap->free = gap->touching = {};
+  gap->summary = gap->unexplained + "; " + why;
 }
 
 GapFit CloseGap(const MethodInput& input, MethodResult all, const std::string& not_judged) {
@@ -279,7 +279,8 @@ GapFit CloseGap(const MethodInput& input, MethodResult all, const std::string& n
   fit.gap.free = residual.free, fit.gap.touching = residual.touching;
   if (residual.residual.free || residual.residual.touching)
     fit.gap.residual = std::make_shared<const Residual>(std::move(residual.residual));
-  fit.gap.summary = Summarise(free, touching, fit.gap);
+  fit.gap.unexplained = Unexplained(free, touching, fit.gap.informed);
+  fit.gap.summary = Summarise(fit.gap);
   return fit;
 }
 

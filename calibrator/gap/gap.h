@@ -34,8 +34,9 @@ struct Gap {
   /// learnt from all transitions; null where there is no alarm, or too little to learn from
   std::shared_ptr<const Residual> residual;
   ResidualQuality free, touching;  ///< of the residual's functions
-  /// in words, for people: what is learnt, or why nothing is; empty = no alarm
-  std::string summary;
+  /// in words, for people: what the model does not explain, and what informs its parameters; then
+  /// what is learnt of the rest, or why nothing is. Empty = no alarm
+  std::string unexplained, summary;
 };
 
 /// A posterior, and what its simulators lack.

@@ -144,8 +144,9 @@ std::vector<MotionRow> ReadRows(CsvReader& table, const TableColumns& columns,
   return rows;
 }
 
-std::vector<std::string> Warnings(const std::vector<MotionRow>& rows, const Efforts& efforts,
+std::vector<std::string> Warnings(const MotionTable& motion, const Efforts& efforts,
                                   const RobotDescription& robot) {
+  const std::vector<MotionRow>& rows = motion.rows;
   if (rows.empty()) return {};
   const ColumnNames names(robot);
   std::vector<std::string> states = names.q, still, missing, warnings;
@@ -162,7 +163,8 @@ std::vector<std::string> Warnings(const std::vector<MotionRow>& rows, const Effo
     warnings.push_back(fmt::format("the same in all rows: {}", fmt::join(still, ", ")));
   for (std::string& warning : efforts.Warnings(names, robot))
     warnings.push_back(std::move(warning));
-  for (std::string& question : AskStateUnits(rows, robot)) warnings.push_back(std::move(question));
+  for (std::string& question : AskStateUnits(rows, motion.has_velocities, robot))
+    warnings.push_back(std::move(question));
   return warnings;
 }
 
@@ -199,7 +201,7 @@ MotionTable ReadMotionTable(const std::string& file, const RobotDescription& rob
   Efforts efforts(robot);
   MotionTable motion{
       ReadRows(table, columns, robot, efforts), columns.has_next(), columns.has_velocities(), {}};
-  motion.warnings = Warnings(motion.rows, efforts, robot);
+  motion.warnings = Warnings(motion, efforts, robot);
   return motion;
 }
 
@@ -234,7 +236,7 @@ MotionTable MakeMotionTable(const MotionColumns& columns, const RobotDescription
       throw std::invalid_argument(fmt::format("{}, in row {}", fault, i));
     motion.rows.push_back(std::move(row));
   }
-  motion.warnings = Warnings(motion.rows, efforts, robot);
+  motion.warnings = Warnings(motion, efforts, robot);
   return motion;
 }
 

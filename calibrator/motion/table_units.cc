@@ -51,11 +51,12 @@ class Question {
 
 }  // namespace
 
-std::vector<std::string> AskStateUnits(const std::vector<MotionRow>& rows,
+std::vector<std::string> AskStateUnits(const std::vector<MotionRow>& rows, bool velocities,
                                        const RobotDescription& robot) {
   const std::string far = "far beyond the joint's limits", fast = "beyond the joint's speed limit";
-  Question angles(far, "degrees"), lengths(far, "millimetres"), rates(fast, "degrees per second"),
-      speeds(fast, "millimetres per second");
+  const std::string rate = velocities ? " per second" : "", column = velocities ? "v/" : "q/";
+  Question angles(far, "degrees"), lengths(far, "millimetres"), rates(fast, "degrees" + rate),
+      speeds(fast, "millimetres" + rate);
   for (int i = 0; i < robot.num_joints(); ++i) {
     const JointDescription& joint = robot.joints[static_cast<size_t>(i)];
     if (joint.num_positions() != 1) continue;
@@ -67,7 +68,7 @@ std::vector<std::string> AskStateUnits(const std::vector<MotionRow>& rows,
       return joint.velocity_limit > 0 && std::abs(x) > joint.velocity_limit;
     });
     (Slides(joint) ? lengths : angles).Add("q/" + joint.name, q);
-    (Slides(joint) ? speeds : rates).Add("v/" + joint.name, v);
+    (Slides(joint) ? speeds : rates).Add(column + joint.name, v);
   }
   std::vector<std::string> questions;
   for (const Question* question : {&angles, &lengths, &rates, &speeds})

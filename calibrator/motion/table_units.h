@@ -13,7 +13,8 @@ namespace plumb {
 // the robot can do is asked about, for people, as nothing of it is certain. Thread-safe.
 
 /// Of positions far beyond their joints' limits in most rows, and of speeds beyond theirs.
-std::vector<std::string> AskStateUnits(const std::vector<MotionRow>& rows,
+/// @param velocities have columns of their own; else they are differences of the positions.
+std::vector<std::string> AskStateUnits(const std::vector<MotionRow>& rows, bool velocities,
                                        const RobotDescription& robot);
 
 /// Of an action that is beyond the effort limit in most rows; else nothing.

@@ -28,6 +28,9 @@ constexpr char kCure[] =
     "is right only near what it was learnt from, record the trained policy's motion and calibrate "
     "with all logs";
 
+// Times the error without it; less may be chance.
+constexpr double kHarm = 1.1;
+
 class Calibration {
  public:
   Calibration(const RobotDescription& robot, std::span<const Log> logs,
@@ -182,7 +185,7 @@ class Calibration {
     if (!residual.any()) return;
     JudgeResidual(model_, residual, split, robot_.ToPhysical(mean), &findings_.holdout);
     const HorizonError& step = findings_.holdout.errors[0];
-    if (step.corrected > step.posterior)
+    if (step.corrected > kHarm * step.posterior)
       LeaveOut(
           "what was learnt of what it lacks predicts motion that it has not seen worse than the "
           "model alone, and is left out",
@@ -202,7 +205,7 @@ class Calibration {
             : TryFinerSteps(model_, rollouts_, ShortestWindow(rollouts_), fit.view.noise_sd,
                             fit.view.fit.mode, options_.execution, &findings_.diagnostic_steps);
     if (!finer) return;
-    const std::string too_long = Judge(*finer, robot_, Moments(findings_.posterior));
+    const std::string too_long = WhyTooLong(*finer, robot_, Moments(findings_.posterior));
     if (!too_long.empty()) findings_.warnings.push_back(too_long);
   }
 

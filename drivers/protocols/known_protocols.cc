@@ -26,23 +26,26 @@ constexpr Maker kMakers[] = {
     {"t-motor", "mit"},      {"mini-cheetah", "mit"}, {"canopen", "cia406"}, {"mti", "xsens"},
 };
 
+constexpr size_t kAlike = 2;  // letters that may differ
+
 std::string InSmallLetters(std::string_view text) {
   std::string small(text);
   std::ranges::transform(small, small.begin(), [](unsigned char c) { return std::tolower(c); });
   return small;
 }
 
-/// @param known not empty.
+/// "; did you mean ...?" and the like, where there is an idea. @param known not empty.
 std::string Meant(std::string_view name, const std::vector<std::string>& known) {
   const std::string small = InSmallLetters(name);
   for (const Maker& maker : kMakers) {
     const std::string protocol(maker.protocol);
     if (small == maker.name && std::ranges::find(known, protocol) != known.end())
-      return fmt::format("{} speaks {}", name, protocol);
+      return fmt::format("; {} speaks {}", name, protocol);
   }
   if (small == "canopen" || small.starts_with("cia"))
-    return "of CANopen, encoders (cia406) are supported, drives (CiA 402) are not";
-  return fmt::format("did you mean {}?", NearestName(small, known));
+    return "; of CANopen, encoders (cia406) are supported, drives (CiA 402) are not";
+  const std::string& nearest = NearestName(small, known);
+  return EditDistance(small, nearest) <= kAlike ? fmt::format("; did you mean {}?", nearest) : "";
 }
 
 /// @param kind "motor" or "sensor". @param table, name the entry of the robot's file.
@@ -50,10 +53,9 @@ void Require(const RobotDescription& robot, const std::string& protocol,
              const std::vector<std::string>& known, const char* kind, const std::string& table,
              const std::string& name) {
   if (std::ranges::find(known, protocol) != known.end()) return;
-  throw std::invalid_argument(fmt::format("{}{} {}: unknown {} protocol '{}'; known: {}; {}",
-                                          PlaceInFile(robot, table, name, "protocol"), table, name,
-                                          kind, protocol, fmt::join(known, ", "),
-                                          Meant(protocol, known)));
+  throw std::invalid_argument(fmt::format(
+      "{}{} {}: unknown {} protocol '{}'; known: {}{}", PlaceInFile(robot, table, name, "protocol"),
+      table, name, kind, protocol, fmt::join(known, ", "), Meant(protocol, known)));
 }
 
 }  // namespace

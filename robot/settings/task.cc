@@ -17,8 +17,7 @@ template <typename Read>
 void ReadByJoint(Config config, const std::vector<JointDescription>& joints,
                  const std::vector<LinkDescription>& links, const Read& read) {
   for (const std::string& key : config.Keys()) {
-    if (IsFixedJoint(links, key))
-      config.Fail(key, "is a fixed joint of the URDF: it does not move");
+    if (IsFixedJoint(links, key)) config.Fail(key, "is fixed: it does not move");
   }
   size_t at = 0;
   for (const JointDescription& joint : joints) {

@@ -24,7 +24,7 @@ struct TaskSettings {
   std::vector<double> velocity = {0, 0, 0};
 };
 
-/// @param links on which what the URDF's fixed joints fix hangs. Thread-safe. @throws ConfigError
+/// @param links on which what fixed joints fix hangs. Thread-safe. @throws ConfigError
 TaskSettings ReadTask(Config config, const std::vector<JointDescription>& joints,
                       const std::vector<LinkDescription>& links);
 

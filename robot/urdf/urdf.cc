@@ -280,11 +280,12 @@ std::string FindUrdf(Config& robot) {
   const fs::path beside_key = fs::path(robot.FileOf("urdf")).parent_path() / name,
                  beside_file = fs::path(robot.file()).parent_path() / name;
   std::error_code error;
-  for (const fs::path& path : {beside_key, beside_file}) {
+  for (const fs::path& path : {beside_file, beside_key}) {
     if (fs::exists(path, error)) return path.string();
   }
-  robot.Fail("urdf", fmt::format("= \"{}\": there is no such file: {}{}", name, beside_key.string(),
-                                 beside_key == beside_file ? "" : ", " + beside_file.string()));
+  robot.Fail("urdf",
+             fmt::format("= \"{}\": there is no such file: {}{}", name, beside_file.string(),
+                         beside_key == beside_file ? "" : ", " + beside_key.string()));
 }
 
 UrdfModel LoadUrdf(const std::string& file, const std::vector<std::string>& fixed) {

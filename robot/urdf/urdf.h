@@ -54,8 +54,8 @@ struct UrdfModel {
   [[noreturn]] void Fail(int line, const std::string& what) const;
 };
 
-/// The path of the URDF that `urdf` in a robot's table [robot] names: relative to the folder of the
-/// file that has the key, or else to that of the file that extends it. Thread-safe but for the
+/// The path of the URDF that `urdf` in a robot's table [robot] names: relative to the robot's
+/// folder, or else to that of the file that it extends, which has the key. Thread-safe but for the
 /// files. @throws ConfigError naming the paths that it has tried.
 std::string FindUrdf(Config& robot);
 

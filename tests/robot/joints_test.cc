@@ -230,7 +230,7 @@ TEST_CASE("mistakes about targets are at their lines") {
   Refused("hip = 0.5", "hipp = 0.5", "task.target.hipp is not a known key; did you mean hip?");
   for (const std::string table : {"target", "spread"}) {
     Refused(table + " = {", table + " = {weld = 0, ",
-            "task." + table + ".weld is a fixed joint of the URDF: it does not move");
+            "task." + table + ".weld is fixed: it does not move");
   }
   Refused("hip = 0.5", "hip = 1.6", "task.target.hip = 1.6 is beyond the joint's limits [-1, 1.5]");
   Refused("hip = 0.5", "hip = nan", "task.target.hip");

@@ -120,16 +120,16 @@ TEST_CASE("rounding is left only where hardly an error is more than that") {
 }
 
 TEST_CASE("a residual that is left out takes its words with it") {
-  auto residual = std::make_shared<Residual>();
-  residual->free.emplace();
   Gap gap;
   gap.informed = Informed::kNone;
-  gap.residual = residual;
-  gap.summary = "of what it lacks, the learnt residual explains much";
+  gap.residual = std::make_shared<Residual>();
+  gap.free.transitions = 7;
+  gap.unexplained = "the model does not explain the motion";
+  gap.summary = gap.unexplained + "; of what it lacks, the learnt residual explains much";
   LeaveOut("it predicts worse", &gap);
   CHECK(gap.residual == nullptr);
-  CHECK(gap.summary ==
-        "the model does not explain the motion: nothing informs its parameters; it predicts worse");
+  CHECK(gap.free.transitions == 0);
+  CHECK(gap.summary == "the model does not explain the motion; it predicts worse");
 }
 
 }  // namespace
