@@ -12,6 +12,7 @@
 #include "calibrator/live/calibrator.h"
 #include "calibrator/live/checkpoint.h"
 #include "calibrator/motion/motion_log.h"
+#include "calibrator/motion/recorded_robot.h"
 #include "calibrator/results/posterior_file.h"
 #include "common/examples.h"
 #include "common/name_lock.h"
@@ -190,6 +191,7 @@ void PrintIteration(const calibration_status_t& m, const RobotDescription& robot
 
 int RunLog(Process& process, Session& session, const RobotDescription& robot,
            const std::string& file) {
+  for (const std::string& warning : CheckRecordedRobot(file, robot)) spdlog::warn("{}", warning);
   const MotionCounts counts = ReadMotion(file, session.calibrator, [&] {
     while (session.busy() && !process.stopping()) {
       if (session.Work()) PrintIteration(session.Status(), robot);

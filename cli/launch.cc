@@ -51,13 +51,14 @@ class ClosedLoop {
         progress_(robot_, flags.efforts.empty() ? flags.iterations : 1, !flags.efforts.empty()),
         requests_(process.messenger(), "DRIVER_REQUEST"),
         drivers_(process.messenger(), "DRIVER_STATUS",
-                 [&](const driver_status_t& m) { progress_.OnDriver(m); }),
+                 [&](const driver_status_t& m) { Account(), progress_.OnDriver(m); }),
         controllers_(process.messenger(), "CONTROLLER_STATUS",
-                     [&](const controller_status_t& m) { progress_.OnController(m); }),
-        calibrations_(process.messenger(), "CALIBRATION_STATUS",
-                      [&](const calibration_status_t& m) { progress_.OnCalibration(m); }),
+                     [&](const controller_status_t& m) { Account(), progress_.OnController(m); }),
+        calibrations_(
+            process.messenger(), "CALIBRATION_STATUS",
+            [&](const calibration_status_t& m) { Account(), progress_.OnCalibration(m); }),
         trainings_(process.messenger(), "TRAINING_STATUS",
-                   [&](const training_status_t& m) { progress_.OnTraining(m); }),
+                   [&](const training_status_t& m) { Account(), progress_.OnTraining(m); }),
         processes_(flags,
                    {UrlsOf(robot_.buses), process.lcm_url(),
                     setting.coordinator() ? setting.coordinator()->clock() : clock_.ToString(),
@@ -95,7 +96,7 @@ class ClosedLoop {
       }
       if (setting_.virtual_run) setting_.virtual_run->Rethrow();
       if (progress_.finished() && finished == 0) finished = clock_.Now();
-      progress_.Account(Seconds(clock_.Now() - start_), SecondsSince(really_started_));
+      Account();
       if (!AllRunning() || !KeepArmed()) return 1;
       for (const std::string& row : progress_.TakeRows()) Print(row);
       ShowStatus();
@@ -111,6 +112,11 @@ class ClosedLoop {
   }
 
  private:
+  /// Before a message, too: the time until then was spent on what its sender was waited for.
+  void Account() {
+    progress_.Account(Seconds(clock_.Now() - start_), SecondsSince(really_started_));
+  }
+
   /// While somebody works in virtual time, a tenth of a second of real time has passed.
   bool GoOn() {
     for (const auto& [channel, message] : setting_.virtual_run->TakeStrangers())

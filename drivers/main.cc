@@ -87,11 +87,11 @@ class DriverProcess {
   int Run() {
     try {
       while (!process_.stopping()) Step();
-      return DisarmAndStop();
-    } catch (const std::exception&) {  // whatever it is, the motors come first
+      return DisarmAndStop("the driver was told to end");
+    } catch (const std::exception& error) {  // whatever it is, the motors come first
       deaf_ = true;
       try {
-        DisarmAndStop();
+        DisarmAndStop(fmt::format("the driver ends: {}", error.what()));
       } catch (const std::exception&) {  // the first one says why
       }
       throw;
@@ -219,11 +219,8 @@ class DriverProcess {
 
   /// Zero torque and idle drives, confirmed by their heartbeats. @return 1 if a drive that may be
   /// armed has not confirmed it in time, else 0: one that was never there has nothing to confirm.
-  int DisarmAndStop() {
-    driver_request_t disarm{};
-    disarm.utime = clock_.Utime();
-    disarm.request = driver_request_t::DISARM;
-    driver_.OnRequest(disarm, clock_.Now(), disarm.utime);
+  int DisarmAndStop(std::string_view why) {
+    driver_.End(why, clock_.Now(), clock_.Utime());
     const auto patience = Microseconds(kDisarmTimeout * clock_.scale());
     const int64_t begin = clock_.Now();
     do {

@@ -16,6 +16,7 @@
 #include "calibrator/fit/whitening.h"
 #include "calibrator/fit/window_errors.h"
 #include "calibrator/inference/laplace.h"
+#include "calibrator/results/summary.h"
 #include "common/time_units.h"
 #include "robot/parameter_distribution.h"
 #include "sim/model.h"
@@ -202,6 +203,8 @@ Findings CalibrateRemote(const RobotDescription& robot, std::span<const Log> log
   findings.misspecification.summary = "not judged: the model is not ours";
   findings.holdout.summary = "nothing was held out: the model is not ours";
   findings.agreement.summary = "the logs were not compared: the model is not ours";
+  if (std::string contradiction = Contradiction(findings, robot); !contradiction.empty())
+    findings.warnings.push_back(std::move(contradiction));
   findings.seconds = SecondsSince(start);
   return findings;
 }

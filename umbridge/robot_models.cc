@@ -11,6 +11,7 @@
 #include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/fit/window_errors.h"
 #include "calibrator/inference/laplace.h"
+#include "calibrator/inference/slopes.h"
 #include "sim/model.h"
 
 namespace plumb {

@@ -10,7 +10,7 @@
 #include "calibrator/diagnostics/projected_errors.h"
 #include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/fit/window_errors.h"
-#include "calibrator/inference/laplace.h"
+#include "calibrator/inference/slopes.h"
 #include "common/median.h"
 #include "robot/parameter_distribution.h"
 
@@ -20,19 +20,6 @@ namespace {
 constexpr double kToSd = 1.4826;          // of a normal's median deviation
 constexpr double kMovedTooFar = 1;        // [posterior sd]
 constexpr double kExplainsTooMuch = 0.2;  // of the errors' squares
-
-// Columns: the mean, then each coordinate moved.
-Eigen::MatrixXd Moved(const RobotDescription& robot, const Prior& prior,
-                      const Eigen::VectorXd& mean) {
-  Eigen::MatrixXd physical(mean.size(), mean.size() + 1);
-  physical.col(0) = robot.ToPhysical(mean);
-  for (Eigen::Index i = 0; i < mean.size(); ++i) {
-    Eigen::VectorXd moved = mean;
-    moved(i) += kSlopeDifference * prior.marginals()[static_cast<size_t>(i)].b;
-    physical.col(i + 1) = robot.ToPhysical(moved);
-  }
-  return physical;
-}
 
 // 1 / scale of the errors of each row's coordinate, 0 of outliers.
 Eigen::VectorXd Weights(std::span<const WindowErrors::Row> rows, const Eigen::VectorXd& errors,
@@ -66,23 +53,23 @@ std::optional<FinerSteps> TryFinerSteps(const std::shared_ptr<const Model>& mode
   halved.simulation.substep /= 2;
   WindowErrors coarse(model, rollouts, horizon, execution),
       fine(std::make_shared<const Model>(halved), rollouts, horizon, execution);
-  const Prior prior = PriorOf(robot);
-  const Eigen::MatrixXd physical = Moved(robot, prior, mean);
+  const Eigen::VectorXd physical = robot.ToPhysical(mean);
   for (WindowErrors* errors : {&coarse, &fine}) {
     errors->set_noise_sd(noise_sd);
-    errors->Linearise(physical.col(0));
+    errors->Linearise(physical);
   }
-  const Eigen::MatrixXd whitened = coarse.Whitened(physical);
-  const Eigen::VectorXd finer = fine.Whitened(physical.col(0));
-  *simulated_steps += coarse.simulated_steps() + 2 * fine.simulated_steps();
-  if (!whitened.allFinite() || !finer.allFinite()) return std::nullopt;
+  const Eigen::VectorXd coarser = coarse.Whitened(physical), finer = fine.Whitened(physical);
+  if (!coarser.allFinite() || !finer.allFinite()) return std::nullopt;
 
-  const Eigen::VectorXd weights = Weights(coarse.rows(), whitened.col(0), noise_sd.size());
-  const Eigen::VectorXd before = weights.cwiseProduct(whitened.col(0)),
-                        after = weights.cwiseProduct(finer);
-  const Eigen::MatrixXd jacobian = weights.asDiagonal() *
-                                   (whitened.rightCols(mean.size()).colwise() - whitened.col(0)) /
-                                   kSlopeDifference;
+  const Eigen::VectorXd weights = Weights(coarse.rows(), coarser, noise_sd.size());
+  const Eigen::VectorXd before = weights.cwiseProduct(coarser), after = weights.cwiseProduct(finer);
+  const LeastSquares problem = ProblemOf(robot, coarse);
+  const Eigen::MatrixXd jacobian = Slopes(
+      [&](const Eigen::MatrixXd& u) -> Eigen::MatrixXd {
+        return weights.asDiagonal() * problem.errors(problem.prior.FromStandard(u));
+      },
+      problem.prior.ToStandard(mean), before, problem.block);
+  *simulated_steps += coarse.simulated_steps() + 2 * fine.simulated_steps();
   Eigen::MatrixXd precision = jacobian.transpose() * jacobian;
   precision.diagonal().array() += 1;
   FinerSteps result;

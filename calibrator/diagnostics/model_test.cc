@@ -13,6 +13,7 @@
 #include "calibrator/fit/recorded_window.h"
 #include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/inference/displaced.h"
+#include "calibrator/inference/slopes.h"
 #include "common/decompositions.h"
 #include "robot/parameter_distribution.h"
 #include "sim/tasks/task.h"

@@ -15,6 +15,7 @@
 namespace plumb {
 namespace {
 
+constexpr char kMixture[] = "mixture";
 constexpr double kAxis = 2;  // [sd] at which the shape is checked
 // drop of the log posterior there, relative to a Gaussian's
 constexpr double kFlattest = 0.5, kSteepest = 2;
@@ -108,7 +109,7 @@ MethodResult MixtureFrom(const MethodInput& input, MethodResult laplace) {
       },
       Modes(curriculum), options);
   MethodResult result = std::move(laplace);
-  result.used = "mixture";
+  result.used = kMixture;
   result.posterior = fit.mixture;
   result.ess = fit.ess;
   Random random = SampleStream(input);
@@ -172,12 +173,20 @@ std::vector<Method> LikelihoodMethods() {
        "mode by Levenberg and Marquardt's method from several first guesses, noise scale and tails "
        "estimated on the way; curvature around it",
        Laplace},
-      {"mixture",
+      {kMixture,
        "all modes that were found, weighed and shaped by adaptive importance sampling of the "
        "one-step "
        "likelihood",
        Mixture},
   };
+}
+
+std::string Doubt(const std::string& used, double ess, Eigen::Index n) {
+  if (used != kMixture || !(ess < kLeastEss * static_cast<double>(n + 1))) return {};
+  return fmt::format(
+      "; but how well is a guess, as the likelihood has more peaks than samples can tell apart "
+      "({:.1f} of them count)",
+      ess);
 }
 
 bool KnowsLikelihood(const std::string& method) {

@@ -13,6 +13,7 @@
 #include "calibrator/fit/whitening.h"
 #include "calibrator/fit/window_errors.h"
 #include "calibrator/inference/laplace.h"
+#include "calibrator/inference/slopes.h"
 
 namespace plumb {
 namespace {
@@ -279,6 +280,8 @@ bool StreamingLaplace::AdaptNoise() {
 bool StreamingLaplace::Settle() {
   if (pieces_.empty()) return true;
   double last_step = std::numeric_limits<double>::infinity();
+  Eigen::VectorXd last = Eigen::VectorXd::Zero(p_);  // where the last solution led to
+  double share = 1;                                  // of that which is gone
   for (int round = 0; round < kRounds; ++round) {
     std::vector<size_t> some;
     for (size_t i = 0; i < pieces_.size(); ++i) {
@@ -299,6 +302,11 @@ bool StreamingLaplace::Settle() {
     next_ = 0;
     const Eigen::VectorXd before = mode_;
     Solve();
+    // To and fro about a place where errors jump: closer and closer to it.
+    const Eigen::VectorXd displacement = mode_ - before;
+    if (displacement.dot(last) < -last.squaredNorm() / 2) share /= 2;
+    last = displacement;
+    if (share < 1) mode_ = before + share * displacement;
     const double step = DistanceFrom(before);
     // A short step that is no shorter than the last one is rounding, in a direction that next to
     // nothing is known of.

@@ -8,6 +8,7 @@
 
 #include "calibrator/inference/noise.h"
 #include "calibrator/inference/sandwich.h"
+#include "calibrator/inference/slopes.h"
 #include "common/decompositions.h"
 
 namespace plumb {
@@ -65,17 +66,9 @@ class Fit {
     return problem_.errors(problem_.prior.FromStandard(u));
   }
 
-  // All parameters in one batch. Where one step forward is no simulator, one backward has to do.
   void Differentiate() {
-    const Eigen::MatrixXd at =
-        u_.replicate(1, n_) + kDifference * Eigen::MatrixXd::Identity(n_, n_);
-    jacobian_ = (Evaluate(at).colwise() - errors_) / kDifference;
-    for (Eigen::Index i = 0; i < n_; ++i) {
-      if (jacobian_.col(i).allFinite()) continue;
-      jacobian_.col(i) =
-          (errors_ - Evaluate(u_ - kDifference * Eigen::VectorXd::Unit(n_, i))) / kDifference;
-      if (!jacobian_.col(i).allFinite()) jacobian_.col(i).setZero();  // nothing can be told of it
-    }
+    jacobian_ =
+        Slopes([&](const Eigen::MatrixXd& u) { return Evaluate(u); }, u_, errors_, problem_.block);
     fresh_ = near_ = true;
   }
 

@@ -29,10 +29,6 @@ struct LeastSquares {
   bool scale_known = false;
 };
 
-/// Of forward-difference Jacobians, in standard coordinates: far above the simulations' rounding,
-/// far below any prior's width.
-inline constexpr double kSlopeDifference = 1e-5;
-
 struct LaplaceOptions {
   int max_iterations = 50;
   double tolerance = 0.02;  ///< ends when a step is below that many posterior standard deviations
@@ -62,8 +58,8 @@ struct LaplaceFit {
 
 /// Laplace's approximation of the posterior: the mode by Levenberg and Marquardt's method in
 /// standard coordinates, where the prior is one more residual |u|^2 and no parameter has bounds,
-/// with a forward-difference Jacobian of all parameters in one batch, kept up by Broyden's formula
-/// while steps are short; around it a Gaussian of the curvature J'J / s^2 + 1.
+/// with a Jacobian by Slopes, kept up by Broyden's formula while steps are short; around it a
+/// Gaussian of the curvature J'J / s^2 + 1.
 ///
 /// The scale s of each group's noise is estimated along the way, s^2 = sum r^2 / (N - d_eff N /
 /// N_all), which also damps the first steps: far from the mode noise seems large. It is never taken

@@ -247,6 +247,7 @@ std::optional<CalibrationReport> SimOpt::Report() {
           ? FindIdentifiability(robot_, state_.information,
                                 prior_.covariance.diagonal().cwiseSqrt(), moments)
           : FindIdentifiability(robot_, discrepancy_, state_.rollouts, moments);
+  report.identifiability.summary += Doubt(state_.used, state_.ess, prior_.mean.size());
   if (state_.informed == Informed::kNone)
     report.identifiability.summary = fmt::format("no parameter is determined: {}", kNotInformed);
   report.failures = discrepancy_.failures();

@@ -93,8 +93,11 @@ TableColumns FindColumns(const CsvReader& table, const ColumnNames& names,
                        FindAny(table, names.kd),
                        {},
                        {}};
+  // Says what lacks: of a table of targets it is one of these.
+  const bool of_targets = HasAny(table, names.target);
   for (size_t i = 0; i < columns.u.size(); ++i) {
-    if (columns.u[i] < 0 && columns.target[i] < 0) FindAll(table, {names.u[i]});  // says what lacks
+    if (columns.u[i] < 0 && columns.target[i] < 0)
+      FindAll(table, {of_targets ? names.target[i] : names.u[i]});
   }
   const bool has_next = HasAny(table, next_q) || HasAny(table, next_v);
   if (has_next || HasAny(table, names.v)) columns.v = FindAll(table, names.v);

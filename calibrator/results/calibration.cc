@@ -64,7 +64,7 @@ class Calibration {
     mean_ = Moments(result.posterior).mean;
     if (result.curriculum) findings_.stages = result.curriculum->stages;
     TakeOneStep(fit.view);
-    FindWhatIsKnown(fit.information);
+    FindWhatIsKnown(fit);
     CrossValidate(result);
     if (findings_.gap.residual) findings_.gap.summary += kCure;
     JudgeSubstep(fit);
@@ -110,13 +110,13 @@ class Calibration {
     return squares / static_cast<double>(view.fit.errors.size());
   }
 
-  void FindWhatIsKnown(const Eigen::MatrixXd& information) {
-    findings_.identifiability =
-        FindIdentifiability(robot_, information, findings_.prior.covariance.diagonal().cwiseSqrt(),
-                            Moments(findings_.posterior));
-    if (!informed())
-      findings_.identifiability.summary =
-          fmt::format("no parameter is determined: {}", kNotInformed);
+  void FindWhatIsKnown(const GapFit& fit) {
+    Identifiability& found = findings_.identifiability;
+    found = FindIdentifiability(robot_, fit.information,
+                                findings_.prior.covariance.diagonal().cwiseSqrt(),
+                                Moments(findings_.posterior));
+    found.summary += Doubt(fit.result.used, fit.result.ess, findings_.prior.mean.size());
+    if (!informed()) found.summary = fmt::format("no parameter is determined: {}", kNotInformed);
     findings_.cramer_rao = findings_.identifiability.cramer_rao;
     ExcitationSettings settings;
     settings.seed = options_.seed;

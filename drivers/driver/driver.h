@@ -69,6 +69,9 @@ class Driver {
   const imu_t* NextImu() noexcept;
   void OnLink(size_t bus, LinkState link) noexcept;
   void OnRequest(const driver_request_t& request, int64_t now, int64_t utime) noexcept;
+  /// The process ends, and nobody has asked for the motors to stop: as DISARM, but for who did it
+  /// and why.
+  void End(std::string_view why, int64_t now, int64_t utime) noexcept;
   void OnCommand(const joint_command_t& command, int64_t now, int64_t utime) noexcept;
   /// Instead of the two above, what is not to be obeyed because of who said it. @param why
   /// a literal.
@@ -163,6 +166,7 @@ class Driver {
   bool DispatchToMotors(size_t bus, const Frame& frame, int64_t now, int64_t utime) noexcept;
   bool DispatchToSensors(size_t bus, const Frame& frame, int64_t now, int64_t utime) noexcept;
   void Refuse(std::string_view why) noexcept;
+  void Stop(std::string_view why) noexcept;
   void Disarm() noexcept;
   void Answer(const driver_request_t& request) noexcept;
   void Estop(std::string_view reason) noexcept;

@@ -23,19 +23,30 @@ void Driver::OnRequest(const driver_request_t& request, int64_t now, int64_t uti
     // Stopping is obeyed whatever the request's time.
     case driver_request_t::DISARM:
       status_.stopped_by_request = true;
-      if (mode_ == Mode::kFault) {
-        stopped_utime_ = utime;
-        return;
-      }
-      cause_.Set("disarmed on request");
-      reason_ = cause_;
-      return Disarm();
+      return Stop("disarmed on request");
     case driver_request_t::ESTOP:
       return Estop("emergency stop requested");
     default:
       ++requests_rejected_;
       return;
   }
+}
+
+void Driver::End(std::string_view why, int64_t now, int64_t utime) noexcept {
+  SetTime(now, utime);
+  StampStopTime();
+  Stop(why);
+}
+
+/// What a fault has stopped already keeps the fault's reason.
+void Driver::Stop(std::string_view why) noexcept {
+  if (mode_ == Mode::kFault) {
+    stopped_utime_ = utime_;
+    return;
+  }
+  cause_.Set("{}", why);
+  reason_ = cause_;
+  Disarm();
 }
 
 /// With the next status, which tells of its effect.

@@ -139,6 +139,15 @@ TEST_CASE("the loop closes, and its log gives the same distributions bit by bit"
   REQUIRE_FALSE(offline.failed());
   same(stage.folder / "offline");
 
+  Child other("other",
+              {Stage::Binary("plumb-calibrator"),
+               std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/servo", "--log", log,
+               "--checkpoint", stage.folder / "other"},
+              stage.folder / "other.log");
+  REQUIRE(other.WaitFor(kLong));
+  CHECK(other.failed());
+  CHECK_THAT(other.Tail(10), Contains("run.lcmlog: is a log of pendulum, not of servo"));
+
   // The programs read the files that the run has left.
   const std::string posterior = stage.folder / "run/calibration/posterior_2.json";
   const std::vector<std::vector<std::string>> readers{

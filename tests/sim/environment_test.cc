@@ -149,6 +149,7 @@ TEST_CASE("through a driver a quadruped's knee at its stop is not pushed into it
   RobotDescription robot = LoadRobot(SourceFile("robots/quadruped"));
   // Through a driver substeps are others, by which the bounce off a stop is another.
   robot.simulation.integrator = SimulationSettings::Integrator::kSemiImplicit;
+  robot.simulation.substep = 0.004;
   Environment environment(robot), driven(robot);
   driven.SendThroughDriver();
   const auto& joints = robot.joints;

@@ -145,6 +145,18 @@ TEST_CASE("somebody else's linear model has the posterior of linear regression")
   CHECK(found.identifiability.summary == "every parameter is determined by this motion");
   CHECK(found.transitions == kOutcomes);
   CHECK_THAT(found.misspecification.summary, Catch::Contains("not judged"));
+  CHECK(found.warnings.empty());
+}
+
+TEST_CASE("what somebody else's model says against the prior is told") {
+  const RobotDescription robot = TwoMasses();
+  // ten and twelve of the prior's standard deviations from its mean
+  const std::vector<Log> logs{Record(Eigen::Vector2d(11, -11), true)};
+  const Serving serving({NextStates()});
+  RemoteModel model(serving.url(), "next_states", 2, NextStatesSize(robot, logs));
+  const Findings found = CalibrateRemote(robot, logs, model, {});
+  REQUIRE(found.warnings.size() == 1);
+  CHECK_THAT(found.warnings[0], Catch::Contains("log and prior contradict each other"));
 }
 
 TEST_CASE("a model that is not what it should be is refused in a line") {

@@ -132,6 +132,12 @@ TEST_CASE("targets and gains that are not this robot's are refused, with the lin
              Catch::Contains("'target_q/pivott' is of no joint with a motor"));
   CHECK_THAT(Refusal("t,q/pivot,v/pivot" + std::string("\n0,0,0\n"), robot),
              Catch::Contains("has no column 'u/pivot'"));
+  // of two drives, one of which has a target
+  RobotDescription two = Robot("double_pendulum/robot.toml");
+  for (JointDescription& joint : two.joints) joint.dynamics.kp = kKp;
+  const std::string &a = two.joints[0].name, &b = two.joints[1].name;
+  CHECK_THAT(Refusal(fmt::format("t,q/{0},q/{1},target_q/{0}\n0,0,0,0\n", a, b), two),
+             Catch::Contains(fmt::format("has no column 'target_q/{}'", b)));
 }
 
 }  // namespace

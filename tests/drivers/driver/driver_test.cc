@@ -269,6 +269,17 @@ TEST_CASE("stops on request") {
     rig.Run(30);
     CHECK(rig.driver->confirmed_idle());
     CHECK(rig.drives[0].disarm_reason() == 0);
+    CHECK(rig.Status().stopped_by_request);
+  }
+  SECTION("the process ends, which nobody has requested") {
+    rig.driver->End("the bus is gone", rig.now, rig.utime());
+    rig.Run(5);
+    CHECK(rig.drives[0].Torque() == 0);
+    CHECK(rig.driver->state() == DriveState::kIdle);
+    CHECK(rig.Reason() == "the bus is gone");
+    CHECK_FALSE(rig.Status().stopped_by_request);
+    rig.Run(30);
+    CHECK(rig.driver->confirmed_idle());
   }
   SECTION("ESTOP") {
     rig.Request(driver_request_t::ESTOP);

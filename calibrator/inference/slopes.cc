@@ -1,0 +1,70 @@
+#include "calibrator/inference/slopes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace plumb {
+namespace {
+
+// Largest share that one observation has of a column's sum of squares.
+double LargestShare(const Eigen::VectorXd& column, std::span<const int> block) {
+  const double total = column.squaredNorm();
+  if (total == 0) return 0;
+  double largest = 0, own = 0;
+  int before = -1;
+  for (Eigen::Index i = 0; i < column.size(); ++i) {
+    if (block[static_cast<size_t>(i)] != before) own = 0;
+    before = block[static_cast<size_t>(i)];
+    own += column(i) * column(i);
+    largest = std::max(largest, own);
+  }
+  return largest / total;
+}
+
+// Of two sides of one point. Zero where they are opposite.
+Eigen::VectorXd Flatter(const Eigen::VectorXd& forward, const Eigen::VectorXd& backward) {
+  const Eigen::ArrayXd f = forward.array(), b = backward.array();
+  return (f * b > 0).select((f.abs() < b.abs()).select(f, b), 0.0);
+}
+
+// Half of the larger: what the curvature makes of so small a difference is far less.
+bool Agree(const Eigen::VectorXd& forward, const Eigen::VectorXd& backward) {
+  return (forward - backward).squaredNorm() <
+         std::max(forward.squaredNorm(), backward.squaredNorm()) / 4;
+}
+
+}  // namespace
+
+Eigen::MatrixXd Slopes(const std::function<Eigen::MatrixXd(const Eigen::MatrixXd&)>& errors,
+                       const Eigen::VectorXd& u, const Eigen::VectorXd& at_u,
+                       std::span<const int> block) {
+  const Eigen::Index n = u.size();
+  const Eigen::MatrixXd at = u.replicate(1, n) + kSlopeDifference * Eigen::MatrixXd::Identity(n, n);
+  Eigen::MatrixXd slopes = (errors(at).colwise() - at_u) / kSlopeDifference;
+  std::vector<Eigen::Index> doubted;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (!slopes.col(i).allFinite() || LargestShare(slopes.col(i), block) > kDominant)
+      doubted.push_back(i);
+  }
+  if (doubted.empty()) return slopes;
+  Eigen::MatrixXd behind(n, static_cast<Eigen::Index>(doubted.size()));
+  for (Eigen::Index k = 0; k < behind.cols(); ++k)
+    behind.col(k) =
+        u - kSlopeDifference * Eigen::VectorXd::Unit(n, doubted[static_cast<size_t>(k)]);
+  const Eigen::MatrixXd backward = -(errors(behind).colwise() - at_u) / kSlopeDifference;
+  for (Eigen::Index k = 0; k < backward.cols(); ++k) {
+    auto forward = slopes.col(doubted[static_cast<size_t>(k)]);
+    const bool known = backward.col(k).allFinite();
+    if (forward.allFinite()) {
+      if (known && !Agree(forward, backward.col(k))) forward = Flatter(forward, backward.col(k));
+    } else if (known) {
+      forward = backward.col(k);
+    } else {
+      forward.setZero();
+    }
+  }
+  return slopes;
+}
+
+}  // namespace plumb
