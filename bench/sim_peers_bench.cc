@@ -55,7 +55,7 @@ void MujocoHopperStep(benchmark::State& state, MujocoHopper::Integrator integrat
 BENCHMARK_CAPTURE(MujocoHopperStep, RK4, MujocoHopper::Integrator::kRungeKutta);
 BENCHMARK_CAPTURE(MujocoHopperStep, Euler, MujocoHopper::Integrator::kEuler);
 
-// 20 ms of a quadruped on its feet: five of our substeps, ten of MuJoCo's.
+// 20 ms of a quadruped on its feet: ten substeps each.
 RobotDescription Quadruped() {
   RobotDescription robot = Load("quadruped");
   robot.parameters.clear();

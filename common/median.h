@@ -8,6 +8,10 @@
 
 namespace plumb {
 
+/// Standard deviation over the median of |x - mean| of a normal distribution, 1 / Phi^-1(3/4): what
+/// is far from most does not count.
+inline constexpr double kSdOverMedianDeviation = 1.4826;
+
 /// The middle one of the values, which come in any order; of an even number the mean of the middle
 /// two. @param values none of them NaN. @return NaN if there are none. Thread-safe.
 inline double Median(std::vector<double> values) {

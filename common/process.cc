@@ -176,6 +176,13 @@ bool Process::Sleep(int64_t timeout, const std::function<void()>& meanwhile) {
   return !stopping();
 }
 
+void Process::BeAlone(const std::string& robot) {
+  if (participant_ || !lcm_url_.starts_with("udpm:")) return;  // others have messages of their own
+  alone_.emplace(fmt::format("{} of {} on {}", name_, robot, LcmGroup(lcm_url_)),
+                 fmt::format("another {} of {} is at work on {}: end it, or give another --lcm-url",
+                             name_, robot, lcm_url_));
+}
+
 void Process::BecomeFast(int priority) {
   if (participant_) {
     participant_->ShareProcessor();

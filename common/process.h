@@ -12,6 +12,7 @@
 #include "common/clock.h"
 #include "common/lockstep/participant.h"
 #include "common/messenger.h"
+#include "common/name_lock.h"
 #include "common/signature.h"
 
 namespace CLI {
@@ -75,6 +76,10 @@ class Process {
   /// time, which sends and reads no message; in virtual time the others need not wait for it.
   /// @return false when the process is asked to stop.
   bool Sleep(int64_t timeout, const std::function<void()>& meanwhile = {});
+  /// From here on no other program of this name can be there for this robot on this machine's LCM
+  /// group: who says a channel is alone in that. In virtual time a run is, anyway.
+  /// @throws std::runtime_error if another is there already.
+  void BeAlone(const std::string& robot);
   /// From here on this process belongs to the fast loop. @param priority for BecomeRealtime; in
   /// virtual time there are no priorities, but its turns are to be short.
   void BecomeFast(int priority);
@@ -96,6 +101,7 @@ class Process {
   Participant* participant_;
   Clock clock_;
   std::unique_ptr<Messenger> messenger_;
+  std::optional<NameLock> alone_;
   std::vector<pollfd> polled_;  // keeps its memory from call to call
 };
 

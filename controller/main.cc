@@ -38,6 +38,7 @@ int main(int argc, char** argv) {
       [&](plumb::Process& process) {
         process.BecomeFast(priority);
         const plumb::RobotDescription robot = plumb::LoadRobot(robot_path);
+        process.BeAlone(robot.name);
         const plumb::Clock& clock = process.clock();
         plumb::Controller controller(robot, seed, rest);
         if (!efforts.empty())

@@ -87,11 +87,11 @@ class DriverProcess {
   int Run() {
     try {
       while (!process_.stopping()) Step();
-      return DisarmAndStop("the driver was told to end");
+      return DisarmAndStop("it was told to");
     } catch (const std::exception& error) {  // whatever it is, the motors come first
       deaf_ = true;
       try {
-        DisarmAndStop(fmt::format("the driver ends: {}", error.what()));
+        DisarmAndStop(error.what());
       } catch (const std::exception&) {  // the first one says why
       }
       throw;

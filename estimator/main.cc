@@ -47,6 +47,7 @@ int main(int argc, char** argv) {
       [&](plumb::Process& process) {
         process.BecomeFast(priority);
         const plumb::RobotDescription robot = plumb::LoadRobot(robot_path);
+        process.BeAlone(robot.name);
         plumb::StateObserver observer(robot);
         std::optional<plumb::UnscentedObserver> model_observer;
         if (!model.empty()) model_observer.emplace(AssumedRobot(robot, model));

@@ -1,4 +1,5 @@
 // plumb-robot: a virtual robot. Speaks the CAN bus as drives and sensors do, and obeys PLACE_ROBOT.
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 
@@ -6,6 +7,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <deque>
 #include <memory>
 #include <optional>
 #include <span>
@@ -13,6 +15,7 @@
 #include <vector>
 
 #include "common/examples.h"
+#include "common/name_lock.h"
 #include "common/process.h"
 #include "common/random.h"
 #include "common/realtime.h"
@@ -20,6 +23,7 @@
 #include "common/time_units.h"
 #include "drivers/can/transport.h"
 #include "plumb/place_robot_t.hpp"
+#include "robot/buses.h"
 #include "sim/parameters.h"
 #include "sim/tasks/task.h"
 #include "sim/virtual/virtual_robot.h"
@@ -103,6 +107,7 @@ class Server {
         robot_(description, physical, clock_.Utime()),
         answers_(description.buses.size()) {
     Stand(description, seed, robot_);
+    if (!process.participant()) LockDrives(description);
     for (const BusDescription& bus : description.buses) {
       buses_.push_back({bus.url, OpenTransport(bus.url, robot_.filters(buses_.size()),
                                                {process.participant(),
@@ -138,6 +143,19 @@ class Server {
   }
 
  private:
+  /// Both would answer. What stays within a process is nobody else's.
+  void LockDrives(const RobotDescription& description) {
+    for (const int joint : description.driven()) {
+      const MotorDescription& motor = description.joints[static_cast<size_t>(joint)].motor;
+      const std::string bus = InnermostBus(description.buses[motor.bus].url);
+      if (bus.starts_with("loop:")) continue;
+      locks_.emplace_back(fmt::format("virtual drive {} {} on {}", motor.protocol, motor.node, bus),
+                          fmt::format("another virtual robot has the drive of node {} on {}: end "
+                                      "it, or give another --bus",
+                                      motor.node, bus));
+    }
+  }
+
   struct Arrival {
     int64_t utime;
     size_t bus;
@@ -193,6 +211,7 @@ class Server {
   Process& process_;
   const Clock& clock_;
   VirtualRobot robot_;
+  std::deque<NameLock> locks_;
   std::vector<Bus> buses_;
   std::vector<int> fds_;
   std::array<Frame, 32> frames_;

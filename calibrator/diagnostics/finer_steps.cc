@@ -17,7 +17,6 @@
 namespace plumb {
 namespace {
 
-constexpr double kToSd = 1.4826;          // of a normal's median deviation
 constexpr double kMovedTooFar = 1;        // [posterior sd]
 constexpr double kExplainsTooMuch = 0.2;  // of the errors' squares
 
@@ -31,7 +30,7 @@ Eigen::VectorXd Weights(std::span<const WindowErrors::Row> rows, const Eigen::Ve
   std::vector<double> scale;
   scale.reserve(sizes.size());
   for (std::vector<double>& own : sizes)
-    scale.push_back(own.empty() ? 1 : kToSd * Median(std::move(own)));
+    scale.push_back(own.empty() ? 1 : kSdOverMedianDeviation * Median(std::move(own)));
   Eigen::VectorXd weights(errors.size());
   for (size_t i = 0; i < rows.size(); ++i) {
     const double s = scale[static_cast<size_t>(rows[i].coordinate)];
@@ -59,17 +58,19 @@ std::optional<FinerSteps> TryFinerSteps(const std::shared_ptr<const Model>& mode
     errors->Linearise(physical);
   }
   const Eigen::VectorXd coarser = coarse.Whitened(physical), finer = fine.Whitened(physical);
+  *simulated_steps += coarse.simulated_steps() + 2 * fine.simulated_steps();
   if (!coarser.allFinite() || !finer.allFinite()) return std::nullopt;
 
   const Eigen::VectorXd weights = Weights(coarse.rows(), coarser, noise_sd.size());
   const Eigen::VectorXd before = weights.cwiseProduct(coarser), after = weights.cwiseProduct(finer);
+  const int64_t so_far = coarse.simulated_steps();
   const LeastSquares problem = ProblemOf(robot, coarse);
   const Eigen::MatrixXd jacobian = Slopes(
       [&](const Eigen::MatrixXd& u) -> Eigen::MatrixXd {
         return weights.asDiagonal() * problem.errors(problem.prior.FromStandard(u));
       },
       problem.prior.ToStandard(mean), before, problem.block);
-  *simulated_steps += coarse.simulated_steps() + 2 * fine.simulated_steps();
+  *simulated_steps += coarse.simulated_steps() - so_far;
   Eigen::MatrixXd precision = jacobian.transpose() * jacobian;
   precision.diagonal().array() += 1;
   FinerSteps result;

@@ -8,6 +8,7 @@
 
 #include "calibrator/inference/chi_squared.h"
 #include "common/decompositions.h"
+#include "common/median.h"
 #include "sim/touch.h"
 
 namespace plumb {
@@ -47,12 +48,6 @@ Eigen::MatrixXd RangeBasis(const Eigen::MatrixXd& jacobian) {
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(scaled);
   qr.setThreshold(1e-7);
   return FirstColumns(qr.householderQ(), qr.rank());
-}
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 bool SameReading(const Transition& a, const Transition& b) {
@@ -150,7 +145,7 @@ void ProjectedErrors::Weigh(const Eigen::VectorXd& errors) {
   for (Eigen::Index i = 0; i < errors.size(); ++i) sizes[group(i)].push_back(std::abs(errors(i)));
   std::map<std::pair<int, bool>, double> largest;
   for (const auto& [key, values] : sizes)
-    largest[key] = kOutlier * std::max(1.0, 1.4826 * Median(values));
+    largest[key] = kOutlier * std::max(1.0, kSdOverMedianDeviation * Median(values));
   weight.setOnes(errors.size());
   for (Eigen::Index i = 0; i < errors.size(); ++i) {
     const double ratio = largest[group(i)] / std::abs(errors(i));

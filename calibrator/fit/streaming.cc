@@ -302,15 +302,18 @@ bool StreamingLaplace::Settle() {
     next_ = 0;
     const Eigen::VectorXd before = mode_;
     Solve();
-    // To and fro about a place where errors jump: closer and closer to it.
-    const Eigen::VectorXd displacement = mode_ - before;
-    if (displacement.dot(last) < -last.squaredNorm() / 2) share /= 2;
-    last = displacement;
-    if (share < 1) mode_ = before + share * displacement;
+    // To and fro about a place where errors jump: closer and closer to it, to rest where a short
+    // step still turns back.
+    const Eigen::VectorXd displacement = mode_ - before, scaled = precision_ * last;
+    const bool turns = displacement.dot(scaled) < -last.dot(scaled) / 2;
     const double step = DistanceFrom(before);
+    last = displacement;
+    if (turns) share /= 2;
+    if (share < 1) mode_ = before + share * displacement;
     // A short step that is no shorter than the last one is rounding, in a direction that next to
     // nothing is known of.
-    const bool rests = step <= kSettled || (step <= kUnmoved && step > last_step / 2);
+    const bool rests = step <= kSettled || (step <= kUnmoved && step > last_step / 2) ||
+                       (turns && share * step <= kUnmoved);
     last_step = step;
     if (!AdaptNoise() && rests) return true;
   }

@@ -17,8 +17,9 @@ namespace plumb {
 
 /// Laplace's approximation of the posterior of one-step windows, transition by transition as they
 /// arrive. Once settled it equals FitLaplace of WindowErrors with horizon 1, normal noise of
-/// estimated scale and no clusters. Where starts are uncertain and their sd is not recorded, their
-/// noise is taken from the errors' scale once that is off by more than 5 %, as in FitCurriculum.
+/// estimated scale and no clusters, but where errors jump: slopes are forward differences alone.
+/// Where starts are uncertain and their sd is not recorded, their noise is taken from the errors'
+/// scale once that is off by more than 5 %, as in FitCurriculum.
 ///
 /// Of each transition its whitened errors and their slopes are kept, as they were at the mode of
 /// the time; their squares' sums are quadratic functions, from which mode, covariance and noise

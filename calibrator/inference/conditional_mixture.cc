@@ -10,6 +10,7 @@
 #include "calibrator/inference/gaussian_mixture.h"
 #include "calibrator/inference/truncated_prior.h"
 #include "common/decompositions.h"
+#include "common/median.h"
 
 namespace plumb {
 namespace {
@@ -43,7 +44,7 @@ MatrixXd RobustCovariance(MatrixXd outcomes) {
     };
     const double centre = median();
     sorted = (row.array() - centre).abs();
-    const double reach = 5 * 1.4826 * median();
+    const double reach = 5 * kSdOverMedianDeviation * median();
     // Where more than half are equal there is no telling what is absurd.
     if (reach > 0) row = row.array().max(centre - reach).min(centre + reach).eval();
   }

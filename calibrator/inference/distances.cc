@@ -173,7 +173,7 @@ VectorXd MedianDeviation(const MatrixXd& outcomes) {
     for (const Index j : finite) values.push_back(outcomes(i, j));
     const double centre = Median(values);
     for (double& value : values) value = std::abs(value - centre);
-    deviation(i) = 1.4826 * Median(std::move(values));
+    deviation(i) = kSdOverMedianDeviation * Median(std::move(values));
   }
   return deviation;
 }

@@ -46,9 +46,9 @@ SetDistance MakeDistance(const std::string& name, const Eigen::MatrixXd& recorde
 Eigen::VectorXd Distances(const std::string& name, const Eigen::MatrixXd& outcomes,
                           const Eigen::VectorXd& observed, const Eigen::VectorXd& scale);
 
-/// 1.4826 * median absolute deviation from the median, a standard deviation for normal noise, of
-/// every row over the columns that are finite throughout; 0 where it does not vary or there are
-/// none.
+/// kSdOverMedianDeviation * median absolute deviation from the median, a standard deviation for
+/// normal noise, of every row over the columns that are finite throughout; 0 where it does not vary
+/// or there are none.
 Eigen::VectorXd MedianDeviation(const Eigen::MatrixXd& outcomes);
 
 /// Scale of every statistic that outliers in the observation do not dominate (PCMAD: Schaelte,

@@ -80,12 +80,8 @@ class Fit {
         Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(Curvature(), Eigen::EigenvaluesOnly)
             .eigenvalues();
     if (values(0) > kLopsided * values(n_ - 1)) return;
-    const Eigen::MatrixXd at =
-        u_.replicate(1, n_) - kDifference * Eigen::MatrixXd::Identity(n_, n_);
-    const Eigen::MatrixXd backward = -(Evaluate(at).colwise() - errors_) / kDifference;
-    for (Eigen::Index i = 0; i < n_; ++i) {
-      if (backward.col(i).allFinite()) jacobian_.col(i) = (jacobian_.col(i) + backward.col(i)) / 2;
-    }
+    jacobian_ = CentralSlopes([&](const Eigen::MatrixXd& u) { return Evaluate(u); }, u_, errors_,
+                              problem_.block, jacobian_);
   }
 
   // Information that is no more than rounding is none.

@@ -67,4 +67,21 @@ Eigen::MatrixXd Slopes(const std::function<Eigen::MatrixXd(const Eigen::MatrixXd
   return slopes;
 }
 
+Eigen::MatrixXd CentralSlopes(const std::function<Eigen::MatrixXd(const Eigen::MatrixXd&)>& errors,
+                              const Eigen::VectorXd& u, const Eigen::VectorXd& at_u,
+                              std::span<const int> block, const Eigen::MatrixXd& forward) {
+  const Eigen::Index n = u.size();
+  const Eigen::MatrixXd at = u.replicate(1, n) - kSlopeDifference * Eigen::MatrixXd::Identity(n, n);
+  const Eigen::MatrixXd backward = -(errors(at).colwise() - at_u) / kSlopeDifference;
+  Eigen::MatrixXd slopes = forward;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (!backward.col(i).allFinite()) continue;
+    const bool jumps = !Agree(forward.col(i), backward.col(i)) &&
+                       LargestShare(forward.col(i) - backward.col(i), block) > kDominant;
+    slopes.col(i) = jumps ? Flatter(forward.col(i), backward.col(i))
+                          : Eigen::VectorXd((forward.col(i) + backward.col(i)) / 2);
+  }
+  return slopes;
+}
+
 }  // namespace plumb

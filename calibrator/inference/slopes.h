@@ -18,14 +18,21 @@ inline constexpr double kDominant = 0.5;
 ///
 /// Errors may jump: a contact is made or not, a foot sticks or slips. A difference across a jump is
 /// no slope, but so large that it would pass for nearly all that is known of a parameter. So where
-/// one observation has more than kDominant of a column, the other side is asked, too; if it says
-/// something else, each row of the column is the flatter side's, and zero where the sides are
-/// opposite. Other columns keep their bits. Thread-safe if `errors` is.
+/// one observation (one transition, say) has more than kDominant of a column, the other side is
+/// asked, too; if it says something else, each row of the column is the flatter side's, and zero
+/// where the sides are opposite. Other columns keep their bits. Thread-safe if `errors` is.
 /// @param errors n x N points -> rows x N; a column that is not finite is a failed simulation. All
 /// points of one kind are asked for at once. @param at_u errors(u).
 /// @param block of each row, ascending from 0: rows of one observation.
 Eigen::MatrixXd Slopes(const std::function<Eigen::MatrixXd(const Eigen::MatrixXd&)>& errors,
                        const Eigen::VectorXd& u, const Eigen::VectorXd& at_u,
                        std::span<const int> block);
+
+/// The same, central: the mean of both sides, which errs by the square of the difference only. A
+/// column whose sides disagree by what one observation says is the flatter side's, as above.
+/// @param forward Slopes.
+Eigen::MatrixXd CentralSlopes(const std::function<Eigen::MatrixXd(const Eigen::MatrixXd&)>& errors,
+                              const Eigen::VectorXd& u, const Eigen::VectorXd& at_u,
+                              std::span<const int> block, const Eigen::MatrixXd& forward);
 
 }  // namespace plumb

@@ -71,7 +71,7 @@ Eigen::VectorXd Tolerance(const std::vector<MotionRow>& rows) {
     if (std::isnan(median)) continue;
     ++compared;
     connected += median <= near(c);
-    within(c) = std::max(near(c), kFarthestNoise * 1.4826 * median);  // of a normal distribution
+    within(c) = std::max(near(c), kFarthestNoise * kSdOverMedianDeviation * median);
   }
   if (2 * connected < compared) return {};
   return within;

@@ -70,7 +70,7 @@ class Driver {
   void OnLink(size_t bus, LinkState link) noexcept;
   void OnRequest(const driver_request_t& request, int64_t now, int64_t utime) noexcept;
   /// The process ends, and nobody has asked for the motors to stop: as DISARM, but for who did it
-  /// and why.
+  /// and why. Nothing arms from then on.
   void End(std::string_view why, int64_t now, int64_t utime) noexcept;
   void OnCommand(const joint_command_t& command, int64_t now, int64_t utime) noexcept;
   /// Instead of the two above, what is not to be obeyed because of who said it. @param why
@@ -217,6 +217,7 @@ class Driver {
   // what stopped it: a fault or a request; the beginning of the reason
   Reason cause_;
   Mode mode_ = Mode::kRest;
+  bool ending_ = false;
   int arms_refused_ = 0;  // since it was armed last
   int64_t now_, utime_;   // latest times given
   int64_t clock_offset_;  // utime - now, as long as nobody sets the clock

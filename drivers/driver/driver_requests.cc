@@ -35,7 +35,11 @@ void Driver::OnRequest(const driver_request_t& request, int64_t now, int64_t uti
 void Driver::End(std::string_view why, int64_t now, int64_t utime) noexcept {
   SetTime(now, utime);
   StampStopTime();
-  Stop(why);
+  ending_ = true;
+  if (status_.stopped_by_request) return;  // whoever has stopped us stays the one who did
+  Reason ends;
+  ends.Set("the driver ends: {}", why);
+  Stop(ends.text());
 }
 
 /// What a fault has stopped already keeps the fault's reason.
@@ -75,6 +79,7 @@ void Driver::Refuse(std::string_view why) noexcept {
 void Driver::RequestArm(int64_t made, bool homed) noexcept {
   if (Active()) return;  // obeyed already
   const int64_t now = now_;
+  if (ending_) return Refuse("the driver ends");
   // Of another run, or from before whatever stopped us, or one that was obeyed already (its maker's
   // clock may be ahead of ours, so that it looks newer than the stop). One from further ahead would
   // make all void that come after it.

@@ -60,6 +60,16 @@ TEST_CASE(
     program = "plumb-driver", words = "another driver is at work on " + stage.bus_url;
     arguments = {pendulum, "--lcm-url", "memq://", "--bus", stage.bus_url};
   }
+  SECTION("a virtual robot") {
+    program = "plumb-robot",
+    words = "another virtual robot has the drive of node 1 on " + stage.bus_url;
+    arguments = {pendulum, "--lcm-url", "memq://", "--bus", stage.bus_url};
+  }
+  SECTION("an estimator or a controller") {
+    program = GENERATE("plumb-estimator", "plumb-controller");
+    words = "another " + program + " of pendulum is at work on " + stage.lcm_url;
+    arguments = {pendulum, "--lcm-url", stage.lcm_url};
+  }
   SECTION("a record") {
     arguments = {"--lcm-url", "memq://", "record", stage.folder / "run.lcmlog"};
     words = "run.lcmlog: is being written already";

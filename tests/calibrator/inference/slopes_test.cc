@@ -34,7 +34,8 @@ Counted SlopesOf(const Function& f, const Eigen::VectorXd& u) {
 }
 
 TEST_CASE("a difference across a jump is no slope") {
-  const Eigen::MatrixXd a = Normals(30, 2, 1);
+  Eigen::MatrixXd a = Normals(30, 2, 1);
+  a(17, 1) = 0.8;  // with the jump: what goes against it would count as none
   const Eigen::Vector2d u(0.3, -0.7);
   const double jump = 0.5;
   // to the right of u within the difference, in one row; or to the left; or nowhere near
@@ -75,6 +76,28 @@ TEST_CASE("where one step forward is no simulator, one backward has to do; else 
   const Eigen::Vector3d first = backward ? Eigen::Vector3d(1, 2, 0) : Eigen::Vector3d::Zero();
   CHECK((found.slopes.col(0) - first).norm() < 1e-9);
   CHECK((found.slopes.col(1) - Eigen::Vector3d(1, 0, 3)).norm() < 1e-9);
+}
+
+TEST_CASE("central differences do not cross a jump, either, and keep what curvature makes") {
+  Eigen::MatrixXd a = Normals(30, 2, 1);
+  a(17, 1) = 0.8;
+  const Eigen::Vector2d u(0.3, -0.7);
+  const double edge = GENERATE(0.5e-5, -0.5e-5, 0.1);
+  const auto f = [&](const Eigen::VectorXd& x) -> Eigen::VectorXd {
+    Eigen::VectorXd y = a.col(1) * x(1) + a.col(0) * std::pow(x(0) - u(0), 2);
+    if (x(1) > u(1) + edge) y(17) += 0.5;
+    return y;
+  };
+  const auto errors = [&](const Eigen::MatrixXd& at) {
+    Eigen::MatrixXd all(30, at.cols());
+    for (Eigen::Index i = 0; i < at.cols(); ++i) all.col(i) = f(Eigen::VectorXd(at.col(i)));
+    return all;
+  };
+  const std::vector<int> block = Numbers(30);
+  const Eigen::MatrixXd found =
+      CentralSlopes(errors, u, f(u), block, Slopes(errors, u, f(u), block));
+  CHECK(found.col(0).cwiseAbs().maxCoeff() < 1e-9);  // a bottom: forward alone says 1e-5
+  CHECK((found.col(1) - a.col(1)).cwiseAbs().maxCoeff() < 1e-9);
 }
 
 // A foot that slips if friction is a millionth smaller would tell of it to a millionth.

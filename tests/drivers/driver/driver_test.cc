@@ -276,10 +276,29 @@ TEST_CASE("stops on request") {
     rig.Run(5);
     CHECK(rig.drives[0].Torque() == 0);
     CHECK(rig.driver->state() == DriveState::kIdle);
-    CHECK(rig.Reason() == "the bus is gone");
+    CHECK(rig.Reason() == "the driver ends: the bus is gone");
     CHECK_FALSE(rig.Status().stopped_by_request);
+    rig.Request(driver_request_t::ARM);  // as whoever keeps it armed would
     rig.Run(30);
     CHECK(rig.driver->confirmed_idle());
+    CHECK(rig.Reason() == "the driver ends: the bus is gone; ARM refused: the driver ends");
+  }
+  SECTION("the process ends after somebody has stopped the motors") {
+    rig.Request(driver_request_t::DISARM);
+    rig.Run(5);
+    rig.driver->End("the bus is gone", rig.now, rig.utime());
+    rig.Run(5);
+    CHECK(rig.Reason() == "disarmed on request");
+    CHECK(rig.Status().stopped_by_request);
+  }
+  SECTION("the process ends after a fault") {
+    rig.driver->OnLink(0, LinkState::kDown);
+    rig.Run(5);
+    REQUIRE(rig.driver->state() == DriveState::kFault);
+    const std::string fault = rig.Reason();
+    rig.driver->End("it was told to", rig.now, rig.utime());
+    rig.Run(5);
+    CHECK(rig.Reason() == fault);
   }
   SECTION("ESTOP") {
     rig.Request(driver_request_t::ESTOP);
