@@ -3,9 +3,11 @@
 #include <catch2/catch.hpp>
 #include <cstdlib>
 #include <fstream>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
 
+#include "calibrator/fit/likelihood_methods.h"
 #include "calibrator/fit/robot_problem.h"
 #include "tests/calibrator/fitted_log.h"
 
@@ -45,6 +47,14 @@ TEST_CASE("a budget beyond 32 bits is one") {
       CHECK_THROWS_AS(RunMethod({model, log, options}), Searching);
     }
   }
+}
+
+TEST_CASE("how well parameters are determined is a guess where hardly a sample counts") {
+  CHECK_THAT(Doubt("mixture", 1.04, 15), Catch::Contains("(1.0 of them count)"));
+  CHECK(!Doubt("mixture", 19.9, 3).empty());
+  CHECK(Doubt("mixture", 20, 3).empty());  // five for each parameter, and five
+  CHECK(Doubt("laplace", std::numeric_limits<double>::quiet_NaN(), 15).empty());
+  CHECK(Doubt("reps", 1.04, 15).empty());  // a search's samples say nothing of a likelihood
 }
 
 }  // namespace
