@@ -112,7 +112,7 @@ class ClosedLoop {
   }
 
  private:
-  /// Before a message, too: the time until then was spent on what its sender was waited for.
+  /// Before each message, too: the time up to it belongs to what the run was doing until then.
   void Account() {
     progress_.Account(Seconds(clock_.Now() - start_), SecondsSince(really_started_));
   }

@@ -8,8 +8,8 @@
 
 namespace plumb {
 
-/// Standard deviation over the median of |x - mean| of a normal distribution, 1 / Phi^-1(3/4): what
-/// is far from most does not count.
+/// Standard deviation of a normal distribution over its median of |x - mean|, 1 / Phi^-1(3/4):
+/// times the median it is an estimate that outliers hardly move.
 inline constexpr double kSdOverMedianDeviation = 1.4826;
 
 /// The middle one of the values, which come in any order; of an even number the mean of the middle

@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 namespace plumb {
 namespace {
+
+using Errors = std::function<Eigen::MatrixXd(const Eigen::MatrixXd&)>;
 
 // Largest share that one observation has of a column's sum of squares.
 double LargestShare(const Eigen::VectorXd& column, std::span<const int> block) {
@@ -34,25 +37,34 @@ bool Agree(const Eigen::VectorXd& forward, const Eigen::VectorXd& backward) {
          std::max(forward.squaredNorm(), backward.squaredNorm()) / 4;
 }
 
+// By differences to one side of u, of these columns only.
+Eigen::MatrixXd OneSided(const Errors& errors, const Eigen::VectorXd& u,
+                         const Eigen::VectorXd& at_u, std::span<const Eigen::Index> columns,
+                         double difference) {
+  Eigen::MatrixXd at = u.replicate(1, static_cast<Eigen::Index>(columns.size()));
+  for (size_t k = 0; k < columns.size(); ++k)
+    at(columns[k], static_cast<Eigen::Index>(k)) += difference;
+  return (errors(at).colwise() - at_u) / difference;
+}
+
+std::vector<Eigen::Index> AllOf(const Eigen::VectorXd& u) {
+  std::vector<Eigen::Index> all(static_cast<size_t>(u.size()));
+  std::iota(all.begin(), all.end(), 0);
+  return all;
+}
+
 }  // namespace
 
-Eigen::MatrixXd Slopes(const std::function<Eigen::MatrixXd(const Eigen::MatrixXd&)>& errors,
-                       const Eigen::VectorXd& u, const Eigen::VectorXd& at_u,
+Eigen::MatrixXd Slopes(const Errors& errors, const Eigen::VectorXd& u, const Eigen::VectorXd& at_u,
                        std::span<const int> block) {
-  const Eigen::Index n = u.size();
-  const Eigen::MatrixXd at = u.replicate(1, n) + kSlopeDifference * Eigen::MatrixXd::Identity(n, n);
-  Eigen::MatrixXd slopes = (errors(at).colwise() - at_u) / kSlopeDifference;
+  Eigen::MatrixXd slopes = OneSided(errors, u, at_u, AllOf(u), kSlopeDifference);
   std::vector<Eigen::Index> doubted;
-  for (Eigen::Index i = 0; i < n; ++i) {
+  for (Eigen::Index i = 0; i < u.size(); ++i) {
     if (!slopes.col(i).allFinite() || LargestShare(slopes.col(i), block) > kDominant)
       doubted.push_back(i);
   }
   if (doubted.empty()) return slopes;
-  Eigen::MatrixXd behind(n, static_cast<Eigen::Index>(doubted.size()));
-  for (Eigen::Index k = 0; k < behind.cols(); ++k)
-    behind.col(k) =
-        u - kSlopeDifference * Eigen::VectorXd::Unit(n, doubted[static_cast<size_t>(k)]);
-  const Eigen::MatrixXd backward = -(errors(behind).colwise() - at_u) / kSlopeDifference;
+  const Eigen::MatrixXd backward = OneSided(errors, u, at_u, doubted, -kSlopeDifference);
   for (Eigen::Index k = 0; k < backward.cols(); ++k) {
     auto forward = slopes.col(doubted[static_cast<size_t>(k)]);
     const bool known = backward.col(k).allFinite();
@@ -67,14 +79,12 @@ Eigen::MatrixXd Slopes(const std::function<Eigen::MatrixXd(const Eigen::MatrixXd
   return slopes;
 }
 
-Eigen::MatrixXd CentralSlopes(const std::function<Eigen::MatrixXd(const Eigen::MatrixXd&)>& errors,
-                              const Eigen::VectorXd& u, const Eigen::VectorXd& at_u,
-                              std::span<const int> block, const Eigen::MatrixXd& forward) {
-  const Eigen::Index n = u.size();
-  const Eigen::MatrixXd at = u.replicate(1, n) - kSlopeDifference * Eigen::MatrixXd::Identity(n, n);
-  const Eigen::MatrixXd backward = -(errors(at).colwise() - at_u) / kSlopeDifference;
+Eigen::MatrixXd CentralSlopes(const Errors& errors, const Eigen::VectorXd& u,
+                              const Eigen::VectorXd& at_u, std::span<const int> block,
+                              const Eigen::MatrixXd& forward) {
+  const Eigen::MatrixXd backward = OneSided(errors, u, at_u, AllOf(u), -kSlopeDifference);
   Eigen::MatrixXd slopes = forward;
-  for (Eigen::Index i = 0; i < n; ++i) {
+  for (Eigen::Index i = 0; i < u.size(); ++i) {
     if (!backward.col(i).allFinite()) continue;
     const bool jumps = !Agree(forward.col(i), backward.col(i)) &&
                        LargestShare(forward.col(i) - backward.col(i), block) > kDominant;
