@@ -40,6 +40,7 @@ class Session {
       : robot_(robot),
         clock_(clock),
         folder_(flags.checkpoint),
+        start_(clock.Now()),
         lock_(
             "calibration " + NameOfFile(flags.checkpoint),
             flags.checkpoint + ": another calibrator is at work there: give another --checkpoint"),
@@ -130,6 +131,7 @@ class Session {
   const RobotDescription& robot_;
   const Clock& clock_;
   std::filesystem::path folder_;
+  int64_t start_;  // of the calibration, or of its resumption [us]
   const NameLock lock_;
   SimOpt simopt_;
 
@@ -141,7 +143,6 @@ class Session {
   std::optional<CalibrationReport> report_;
   std::optional<StreamingLaplace> stream_;
   int streamed_iteration_ = 0;
-  int64_t start_ = 0;   // of the calibration [us]
   double seconds_ = 0;  // that the last one took, real ones
 };
 

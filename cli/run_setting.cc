@@ -52,16 +52,12 @@ void RequireKept(const RobotDescription& robot, const std::string& efforts) {
   }
 }
 
-fs::path MakeFolder(const std::string& wanted) {
+fs::path MakeRunFolder(const std::string& wanted) {
   fs::path folder =
       wanted.empty() ? fs::path("runs") / fmt::format("{:%Y-%m-%d-%H%M%S}-{}",
                                                       fmt::localtime(std::time(nullptr)), getpid())
                      : fs::path(wanted);
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error)
-    throw std::runtime_error(
-        fmt::format("{}: cannot be written: {}", folder.string(), error.message()));
+  MakeFolder(folder);
   return folder;
 }
 
@@ -87,7 +83,7 @@ void RequireOwn(const fs::path& folder, const RobotDescription& robot, const Lau
   const std::optional<Checkpoint> training = LoadCheckpoint(file);
   if (!training) return;
   try {
-    RequireContinues(*training, flags.seed, flags.iterations);
+    RequireContinues(*training, robot.fingerprint, flags.seed, flags.iterations);
   } catch (const CheckpointError& error) {
     throw CheckpointError(file.string() + ": " + error.what() + ": give another --output");
   }
@@ -131,7 +127,7 @@ RunSetting::RunSetting(const Process& process, const LaunchFlags& flags)
   RequireProcessFiles(process, flags, robot);
   Lock(process.lcm_url());
   RequireFree(process.lcm_url(), robot.buses, flags.real);
-  output = MakeFolder(flags.output);
+  output = MakeRunFolder(flags.output);
   lock.emplace(output);
   RequireOwn(output, robot, flags);
   for (const std::string& file : {flags.summary, flags.report}) {

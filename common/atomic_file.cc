@@ -152,6 +152,12 @@ void RequireWritable(const std::filesystem::path& file) {
   unlink(temporary.name.c_str());
 }
 
+void MakeFolder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) throw std::runtime_error(folder.string() + ": cannot be made: " + error.message());
+}
+
 void RemoveLeftovers(const std::filesystem::path& folder, const std::string& extension) {
   RemoveLeftoversOf(folder, [&](std::string_view file) { return file.ends_with(extension); });
 }

@@ -43,6 +43,10 @@ class AtomicFile {
 /// @throws std::runtime_error naming the file and the cause.
 void RequireWritable(const std::filesystem::path& file);
 
+/// Makes a folder with those that it is in; one that is there stays as it is. Thread-safe.
+/// @throws std::runtime_error naming the folder and the cause.
+void MakeFolder(const std::filesystem::path& folder);
+
 /// Removes the temporary files that killed processes have left in a folder, of all files whose
 /// names end so: on a full disk they take the room of what replaces them. Thread-safe.
 /// @param extension ".checkpoint"

@@ -5,9 +5,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <charconv>
 #include <stdexcept>
+
+#include "common/small_letters.h"
 
 namespace plumb {
 
@@ -16,11 +17,9 @@ HostAndPort HostAndPort::Split(std::string_view text) {
   const size_t bracket = text.starts_with('[') ? text.find(']') : std::string_view::npos;
   parts.bracketed = bracket != std::string_view::npos;
   const size_t end = text.find(':', parts.bracketed ? bracket : 0);
-  parts.host = text.substr(0, end);
+  parts.host = InSmallLetters(text.substr(0, end));
   if (parts.bracketed) parts.host = parts.host.substr(1, parts.host.size() - 2);
   if (end != std::string_view::npos) parts.port = text.substr(end + 1);
-  std::ranges::transform(parts.host, parts.host.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return parts;
 }
 

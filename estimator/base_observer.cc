@@ -38,7 +38,8 @@ LegOdometry::Settings SettingsOf(const RobotDescription& robot, const FloatingBa
           .slip = robot.estimator.slip,
           .gravity = robot.simulation.gravity,
           .normal = base.spatial ? std::nullopt : std::optional(base.normal()),
-          .give = contact ? Mass(robot) / contact->stiffness : 0};
+          .give = contact ? Mass(robot) / contact->stiffness : 0,
+          .settles_in = contact ? contact->damping / contact->stiffness : 0};
 }
 
 // That the smoother has to remember: of the lag, of what may come late, and those around it.

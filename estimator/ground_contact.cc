@@ -19,7 +19,8 @@ bool ContactTest::Judge(const Motion& motion) {
   const bool pressed_in = motion.height < -kSurelyBelow * height_sd;
   const double height = std::max(0.0, motion.height),
                rise = pressed_in ? std::max(0.0, motion.rise) : motion.rise;
-  const double statistic = Square(height / height_sd) + Square(rise / rise_sd);
+  const double statistic = Square(height / height_sd) + Square(rise / rise_sd) +
+                           Square(motion.slide / std::hypot(motion.slide_sd, kSlideSd));
   touching_ = statistic < (touching_ ? kLeaves : kTouches);
   return touching_;
 }

@@ -11,8 +11,9 @@
 
 namespace plumb {
 
-/// Judges the hypothesis that a point rests on the ground by two residuals that should then be
-/// zero: its height and its vertical velocity, each over its standard deviation. No forces, hence
+/// Judges the hypothesis that a point rests on the ground by residuals that should then be zero:
+/// its height, its vertical velocity and, where a base is told by its legs, the speed at which it
+/// slides along the ground, each over its standard deviation. No forces, hence
 /// no masses, but in the height of a base that stands on soft ground (LegOdometry::Settings::give):
 /// what calibration learns from it is not what it put in. Not thread-safe.
 class ContactTest {
@@ -20,14 +21,16 @@ class ContactTest {
   /// Uncertainty of the ground rather than of the robot: it is not quite even, and gives way.
   static constexpr double kHeightSd = 1e-3;  ///< [m]
   static constexpr double kRiseSd = 0.2;     ///< [m/s]
-  /// Bounds of the sum of both squares, chi-square with two degrees of freedom if the point rests:
-  /// 86 % and 98.9 % of it.
+  static constexpr double kSlideSd = 0.5;    ///< [m/s]
+  /// Bounds of the sum of the squares, of height and rise alone chi-square with two degrees of
+  /// freedom if the point rests: 86 % and 98.9 % of it.
   static constexpr double kTouches = 4, kLeaves = 9;
 
   /// Of the sphere's lowest point. Standard deviations as the filter has them, without those above.
   struct Motion {
-    double height, height_sd;  ///< [m] above the ground
-    double rise, rise_sd;      ///< [m/s]
+    double height, height_sd;        ///< [m] above the ground
+    double rise, rise_sd;            ///< [m/s]
+    double slide = 0, slide_sd = 0;  ///< [m/s] along the ground; 0, 0: not judged by it
   };
   /// A point that is surely below ground level may sink: it presses the ground in. What is lower
   /// than the ground never speaks against contact. @return touching()

@@ -17,8 +17,6 @@ constexpr double kStandsHeightSd = 0.04, kStandsVelocitySd = 0.2;  // [m], [m/s]
 constexpr double kMovesHeightSd = 0.2, kMovesVelocitySd = 3;
 // [s] in which a bias may wander by as much as it may be at the start
 constexpr double kBiasWanders = 100;
-// [s] in which the ground under a foot gives way, or comes back
-constexpr double kSettlesIn = 0.05;
 constexpr double kFootSd = 1e-3;   // [m] play and elasticity of a leg
 constexpr double kAnywhereSd = 1;  // [m] of a foot that has just been set down, horizontally
 constexpr double kSlipped = 16.3;  // chi-square with three degrees of freedom: 99.9 %
@@ -83,7 +81,7 @@ void LegOdometry::Restart(Beginning beginning, const Vector3d& position,
   position_.z() = -lowest;
   velocity_ = rate_bias_ = acceleration_bias_ = rate_ = acceleration_ = Vector3d::Zero();
   force_.reset();
-  borne_ = lift_ = flight_ = rate_change_ = acceleration_change_ = 0;
+  borne_ = lift_ = flight_ = pressed_ = rate_change_ = acceleration_change_ = 0;
   astray_ = false;
   for (Rest& foot : feet_) foot.test.Restart();
   covariance_.setZero();
@@ -114,6 +112,7 @@ void LegOdometry::Predict(double dt, const Vector3d& rate, const Vector3d& force
   borne_ += (felt.z() - borne_) * -std::expm1(-dt / kBorneFor);
   flight_ += dt;
   lift_ += dt * felt.z();
+  pressed_ += (s_.give * std::max(0.0, felt.z()) - pressed_) * -std::expm1(-dt / s_.settles_in);
   dt_ = dt;
 
   position_ += dt * velocity_ + dt * dt / 2 * acceleration_;
@@ -161,28 +160,38 @@ ContactTest::Motion LegOdometry::MotionOf(const Foot& foot) const {
   const Matrix3d to_world = orientation_.toRotationMatrix();
   const Vector3d arm = to_world * foot.centre, rate = rate_ - rate_bias_;
   const Vector3d moves = to_world * (rate.cross(foot.centre) + foot.velocity);
-  // z of: position + arm; velocity + moves. Their derivatives by the error.
+  // Along an axis: position + arm; velocity + moves. Their derivatives by the error.
   const auto& p = covariance_;
-  const Vector3d up = Vector3d::UnitZ();
-  const auto variance = [&](Eigen::Index block, const Vector3d& lever, const Vector3d& by_bias) {
-    const Vector3d by_angle = lever.cross(up);
-    return p(block + 2, block + 2) + by_angle.dot(p.block<3, 3>(kAngle, kAngle) * by_angle) +
+  const auto variance = [&](Eigen::Index block, const Vector3d& axis, const Vector3d& lever,
+                            const Vector3d& by_bias) {
+    const Vector3d by_angle = lever.cross(axis);
+    return axis.dot(p.block<3, 3>(block, block) * axis) +
+           by_angle.dot(p.block<3, 3>(kAngle, kAngle) * by_angle) +
            by_bias.dot(p.block<3, 3>(kRateBias, kRateBias) * by_bias) +
-           2 * p.block<1, 3>(block + 2, kAngle).dot(by_angle) +
-           2 * p.block<1, 3>(block + 2, kRateBias).dot(by_bias) +
+           2 * axis.dot(p.block<3, 3>(block, kAngle) * by_angle) +
+           2 * axis.dot(p.block<3, 3>(block, kRateBias) * by_bias) +
            2 * by_angle.dot(p.block<3, 3>(kAngle, kRateBias) * by_bias);
   };
-  const Vector3d up_in_body = to_world.row(2);
-  const Vector3d by_rate = up_in_body.cross(foot.centre);
-  const double height = variance(kPosition, arm, Vector3d::Zero()) +
+  const auto speed_sd = [&](const Vector3d& axis) {
+    const Vector3d in_body = to_world.transpose() * axis, by_rate = in_body.cross(foot.centre);
+    return std::sqrt(std::max(0.0, variance(kVelocity, axis, moves, by_rate) +
+                                       in_body.dot(foot.velocity_variance * in_body) +
+                                       Square(s_.rate_sd) * by_rate.squaredNorm()));
+  };
+  const Vector3d up = Vector3d::UnitZ(), up_in_body = to_world.row(2);
+  const double height = variance(kPosition, up, arm, Vector3d::Zero()) +
                         up_in_body.dot(foot.centre_variance * up_in_body);
-  const double rise = variance(kVelocity, moves, by_rate) +
-                      up_in_body.dot(foot.velocity_variance * up_in_body) +
-                      Square(s_.rate_sd) * by_rate.squaredNorm();
+  // Of the sphere's lowest point, as it may roll.
+  const Vector3d rolls = foot.radius * (to_world * (rate + foot.rate)).cross(up);
+  Vector3d slides = allowed_ * (velocity_ + moves - rolls);
+  slides.z() = 0;
+  const double slide = slides.norm();
   return {.height = position_.z() + arm.z() - foot.radius,
           .height_sd = std::sqrt(std::max(0.0, height) + Square(s_.ground_sd)),
           .rise = velocity_.z() + moves.z(),
-          .rise_sd = std::sqrt(std::max(0.0, rise))};
+          .rise_sd = speed_sd(up),
+          .slide = slide,
+          .slide_sd = slide > 0 ? speed_sd(slides / slide) : 0};
 }
 
 // Of two points the higher cannot rest on level ground, however high both of them may be.
@@ -228,22 +237,27 @@ void LegOdometry::Forget(Eigen::Index block) {
 }
 
 // Where along the ground, the correction that follows will find out; how high the ground is, is
-// known.
+// known. Whoever lands is seen to rest when the ground has already given way.
 void LegOdometry::SetDown(size_t index, const Foot& foot) {
   const Eigen::Index at = IndexOf(index);
   Forget(at);
   feet_[index].place = position_ + orientation_ * foot.centre;
-  feet_[index].place.z() = foot.radius;
+  feet_[index].place.z() = foot.radius - (lands_ ? pressed_ : 0);
   covariance_.block<3, 3>(at, at) = Square(kAnywhereSd) * allowed_;
   covariance_.col(at + 2).setZero();
   covariance_.row(at + 2).setZero();
   covariance_(at + 2, at + 2) = Square(s_.ground_sd);
 }
 
+// Feet that rest.
+int64_t LegOdometry::Resting() const {
+  return std::count_if(feet_.begin(), feet_.end(),
+                       [](const Rest& foot) { return foot.test.touching(); });
+}
+
 // [m] by which the ground gives way, once it has settled, under each foot that rests.
 double LegOdometry::Pressed() const {
-  const auto resting = std::count_if(feet_.begin(), feet_.end(),
-                                     [](const Rest& foot) { return foot.test.touching(); });
+  const int64_t resting = Resting();
   if (resting == 0 || !force_) return 0;
   return s_.give * std::max(0.0, force_->z()) / static_cast<double>(resting);
 }
@@ -254,7 +268,7 @@ void LegOdometry::Wander(size_t index, const Foot& foot) {
   Vector3d& place = feet_[index].place;
   const Vector3d rate = orientation_ * (rate_ - rate_bias_ + foot.rate);
   place += dt_ * foot.radius * (allowed_ * rate.cross(Vector3d::UnitZ()));
-  const double keeps = std::exp(-dt_ / kSettlesIn), pressed = foot.radius - Pressed();
+  const double keeps = std::exp(-dt_ / s_.settles_in), pressed = foot.radius - Pressed();
   place.z() = pressed + keeps * (place.z() - pressed);
   if (smoother_) smoother_->Scaled(at + 2, keeps);
   covariance_.row(at + 2) *= keeps;
@@ -265,6 +279,7 @@ void LegOdometry::Wander(size_t index, const Foot& foot) {
 }
 
 void LegOdometry::Correct(std::span<const Foot> feet) {
+  lands_ = Resting() == 0;
   for (size_t i = 0; i < feet.size(); ++i) {
     const bool rested = rests(i);
     if (rested) Wander(i, feet[i]);

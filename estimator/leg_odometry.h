@@ -47,6 +47,7 @@ class LegOdometry {
     /// [m / (m/s^2)] by which a single foot that carries the body is pressed in, for each unit of
     /// the specific force upwards: mass / stiffness of the ground. Feet that rest share it.
     double give = 0;
+    double settles_in = 0.05;  ///< [s] in which it is pressed in, or comes back
   };
   /// The legs' measurement of a sphere that can touch the ground, in the body's axes, relative to
   /// the body. Variances without those of the body.
@@ -138,6 +139,7 @@ class LegOdometry {
                          ContactTest::Motion* motion) const;
   void SetDown(size_t index, const Foot& foot);
   void Forget(Eigen::Index block);
+  int64_t Resting() const;
   double Pressed() const;
   void Wander(size_t index, const Foot& foot);
   bool CorrectBy(size_t index, const Foot& foot);
@@ -155,6 +157,9 @@ class LegOdometry {
   double borne_ = 0;  // [m/s^2] specific force upwards, averaged
   // [s] since a foot rested, [m/s] specific force upwards summed up since then
   double flight_ = 0, lift_ = 0;
+  bool lands_ = false;  // no foot rested before this reading
+  // [m] by which a single foot that bears all that is felt has pressed the ground in by now
+  double pressed_ = 0;
   double dt_ = 0;  // [s] of the last prediction
   std::vector<Rest> feet_;
   // Of bounded size, so that what is computed with them needs no memory but the stack.

@@ -69,8 +69,8 @@ ParameterDistribution FirstDistribution(CalibrationStrategy strategy, const Robo
 
 ParameterDistribution DistributionOf(const SimOpt& simopt, const RobotDescription& robot) {
   const SimOpt::State& state = simopt.state();
-  return {state.iteration, robot.parameters, state.distribution, state.residual,
-          Starts(state.rollouts)};
+  return {state.iteration, robot.parameters, state.distribution,
+          state.residual,  state.explained,  Starts(state.rollouts)};
 }
 
 }  // namespace plumb

@@ -164,16 +164,16 @@ class Loop::Running {
 
   // Which policy is deployed from now on.
   void Choose(int iteration) {
-    const bool right = simopt_ && calibrated_.calibration.residual && !simopt_->state().residual;
     const double scatter = trainer_->ScatterOfStarts(distribution_.Mean());
     if (!incumbent_) incumbent_ = trainer_->policy();
     const auto simulated = [&](const GaussianPolicy& policy) {
       return trainer_->EvaluateHeldOut(policy, sample_, Acceptance::kSimulators).mean;
     };
     const Acceptance::Decision decision =
-        right ? acceptance_.Trust(iteration, scatter)
-              : acceptance_.Decide(iteration, scatter,
-                                   {simulated(trainer_->policy()), simulated(*incumbent_)});
+        distribution_.explained
+            ? acceptance_.Trust(iteration, scatter)
+            : acceptance_.Decide(iteration, scatter,
+                                 {simulated(trainer_->policy()), simulated(*incumbent_)});
     result_.decisions.push_back(Summary(decision));
     if (acceptance_.incumbent() == iteration)
       deployed_ = iteration, incumbent_ = trainer_->policy();

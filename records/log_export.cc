@@ -10,6 +10,7 @@
 #include <system_error>
 #include <utility>
 
+#include "common/atomic_file.h"
 #include "common/lcm_log_reader.h"
 #include "common/message_json.h"
 #include "common/message_schema.h"
@@ -190,9 +191,7 @@ ExportCounts ExportCsv(const std::string& log, const std::filesystem::path& fold
       throw std::runtime_error(
           fmt::format("{}: its tables would have more than {} columns", log, kMostColumnsInAll));
   });
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) throw std::runtime_error(folder.string() + ": cannot be made: " + error.message());
+  MakeFolder(folder);
   std::string before;
   for (auto& [key, table] : tables) {
     const auto& [channel, type] = key;
@@ -204,7 +203,7 @@ ExportCounts ExportCsv(const std::string& log, const std::filesystem::path& fold
                                   MessageTable::kMostColumns)] += table.rows();
     } else if (table.rows() > 0) {
       const std::filesystem::path file = folder / (name + ".csv");
-      if (std::filesystem::equivalent(file, log, error))
+      if (std::error_code none; std::filesystem::equivalent(file, log, none))
         throw std::runtime_error(file.string() + ": is read, too: give another folder to write");
       table.Open(file);
       ++counts.channels;

@@ -120,22 +120,16 @@ RecordFolder::RecordFolder(const std::string& log, const About& about)
     throw std::runtime_error(
         fmt::format("{}: is there and no log's: its files are not written over", folder_.string()));
   }
-  const auto make = [&](const fs::path& wanted) {
-    fs::create_directories(wanted, error);
-    if (error)
-      throw std::runtime_error(
-          fmt::format("{}: cannot be made: {}", wanted.string(), error.message()));
-  };
-  make(folder_);
+  MakeFolder(folder_);
   // First, and never missing: it says whose folder this is, to whoever comes after a kill.
   WriteAtomically(folder_ / kRecord, RecordJson(log, about, robot ? robot->name : ""));
   for (const char* earlier : {kToml, kUrdf, kDistribution}) fs::remove(folder_ / earlier, error);
-  make(folder_ / kTypes);
+  MakeFolder(folder_ / kTypes);
   for (const MessageDefinition& definition : MessageDefinitions())
     WriteAtomically(folder_ / kTypes / definition.file, definition.text);
   fs::remove_all(folder_ / kMeshes, error);
   if (!robot) return;
-  if (!robot->meshes.empty()) make(folder_ / kMeshes);
+  if (!robot->meshes.empty()) MakeFolder(folder_ / kMeshes);
   for (const auto& [name, bytes] : robot->meshes) WriteAtomically(folder_ / name, bytes);
   WriteAtomically(folder_ / kUrdf, robot->urdf);
   WriteAtomically(folder_ / kToml, robot->toml);

@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <limits>
 
 #include "common/nearest_name.h"
+#include "common/small_letters.h"
 
 namespace plumb {
 namespace {
@@ -29,12 +29,10 @@ constexpr MotorTable kMotorTables[] = {
 };
 
 // The protocols that have no table are for the drivers to know.
-bool IsMisspelt(std::string protocol, const char* table) {
+bool IsMisspelt(const std::string& protocol, const char* table) {
   if (std::ranges::any_of(kMotorTables, [&](const auto& t) { return protocol == t.protocol; }))
     return false;
-  std::ranges::transform(protocol, protocol.begin(),
-                         [](unsigned char c) { return std::tolower(c); });
-  return EditDistance(protocol, table) <= 2;
+  return EditDistance(InSmallLetters(protocol), table) <= 2;
 }
 
 [[noreturn]] void FailAtTable(const Config& config, const std::string& protocol,

@@ -50,6 +50,9 @@ struct ParameterDistribution {
   GaussianMixture mixture;
   /// that all of these simulators lack; null = nothing
   std::shared_ptr<const Residual> residual = nullptr;
+  /// Whether these simulators, without a residual, are known to explain the robot, but for what is
+  /// too little to matter: false also where nobody has asked, or could tell.
+  bool explained = false;
 
   /// States (q, v) of the robot, num_positions + num_velocities entries, that simulated episodes
   /// may begin with: those in which roll-outs have begun, and some of their motion.
@@ -63,7 +66,7 @@ struct ParameterDistribution {
   /// A message's distribution. @throws std::invalid_argument saying what is wrong: names or
   /// coordinates that are not the description's, counts that do not fit, numbers that are not
   /// finite, weights that do not sum to 1, a covariance that is not symmetric and positive
-  /// semidefinite.
+  /// semidefinite, a residual of simulators that explain the robot without one.
   static ParameterDistribution FromMessage(const parameter_distribution_t& message,
                                            const RobotDescription& description);
   /// The message, except for utime, seed (0) and diagnostics (NaN), which are the sender's to fill

@@ -150,6 +150,8 @@ ParameterDistribution ParameterDistribution::FromMessage(const parameter_distrib
   } catch (const std::invalid_argument& error) {
     Reject(error.what());
   }
+  result.explained = message.explained != 0;
+  if (result.explained && result.residual) Reject("explained, and yet it has a residual");
   if (result.residual) {
     for (const Eigen::VectorXd& draw : result.residual->coordinates)
       RequireNearPrior(draw, "residual's draw", description);
@@ -191,6 +193,7 @@ parameter_distribution_t ParameterDistribution::ToMessage() const {
   }
   message.num_means = static_cast<int32_t>(message.mean.size());
   message.num_covariances = static_cast<int32_t>(message.covariance.size());
+  message.explained = explained ? 1 : 0;
   message.num_residuals = message.num_draws = 0;
   message.residual_margin = 0;
   if (residual) WriteResidual(*residual, &message);

@@ -93,7 +93,7 @@ std::string Summary(const Acceptance::Decision& d) {
   const bool first = d.incumbent < 0 || d.challenger == d.incumbent;
   std::string text = fmt::format("policy {} {}", d.challenger,
                                  first        ? "is the first"
-                                 : d.trusted  ? "trusted: trained without a residual"
+                                 : d.trusted  ? "trusted: the model explains the robot"
                                  : d.accepted ? "accepted"
                                               : "not accepted");
   if (!std::isfinite(d.challenger_return)) return text;

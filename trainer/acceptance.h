@@ -20,7 +20,8 @@ namespace plumb {
 /// lambda being the policy's probability of a fall per step. Of n trials with S steps and F falls
 ///   lambda ~ Gamma(1 + F, S_all / F_all + S),
 /// the conjugate posterior where the prior is the exponential distribution with the mean of all
-/// policies that this robot has tried; zero where none has fallen. What counts is the expectation
+/// policies that this robot has tried, its own trials among them (empirical Bayes); zero where none
+/// has fallen. What counts is the expectation
 /// over lambda, in closed form: how unsure lambda is says nothing for or against a challenger that
 /// has been tried as long as the incumbent. Returns of trials scatter, falls apart, by kScatter of
 /// themselves or, where it is more, by what it makes where an episode begins; the mean of n by

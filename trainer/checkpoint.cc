@@ -21,8 +21,9 @@ namespace {
 
 // Numbers as this machine has them: a checkpoint stays where it was written. Version 3: without
 // trials on the robot, 4 to 6: with other residuals, 7: without the updates' statuses, 8: without
-// what a decision owes to simulation, 9: without what the best policy's normaliser has seen.
-constexpr FileKind kKind{"PLUMBTRN", 10, "a trainer's checkpoint"};
+// what a decision owes to simulation, 9: without what the best policy's normaliser has seen,
+// 10: with distributions that do not tell whether they explain the robot, and without the robot.
+constexpr FileKind kKind{"PLUMBTRN", 11, "a trainer's checkpoint"};
 
 class CheckpointWriter {
  public:
@@ -151,6 +152,7 @@ template <class Archive, class C>
 requires std::same_as<std::remove_const_t<C>, Checkpoint>
 void Transfer(Archive& archive, C& checkpoint) {
   archive(checkpoint.seed);
+  archive(checkpoint.robot);
   archive(checkpoint.identity);
   archive(checkpoint.updates);
   archive(checkpoint.steps);
@@ -191,7 +193,11 @@ const policy_t& DeployedPolicy(const Checkpoint& checkpoint) {
   return checkpoint.incumbent >= 0 ? checkpoint.incumbent_policy : checkpoint.policy;
 }
 
-void RequireContinues(const Checkpoint& checkpoint, uint64_t seed, int iterations) {
+void RequireContinues(const Checkpoint& checkpoint, uint64_t robot, uint64_t seed, int iterations) {
+  if (checkpoint.robot != robot) {
+    throw CheckpointError(
+        "the checkpoint is of another robot: robot.toml or its URDF has changed since");
+  }
   if (checkpoint.seed != seed) {
     throw CheckpointError(
         fmt::format("the checkpoint is of a run with seed {}, not {}", checkpoint.seed, seed));

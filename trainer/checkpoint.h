@@ -33,6 +33,7 @@ struct TriedPolicy {
 /// the same bits. All functions of this header are thread-safe for different files.
 struct Checkpoint {
   uint64_t seed = 0;
+  uint64_t robot = 0;  ///< RobotDescription::fingerprint
   /// of all that a run of `plumb train` depends on; in the trainer process of all that the
   /// iteration depends on, in virtual time, and else 0
   uint64_t identity = 0;
@@ -68,9 +69,9 @@ const policy_t& DeployedPolicy(const Checkpoint& checkpoint);
 
 /// A trainer process' in the folder that it is given.
 inline constexpr char kTrainerCheckpoint[] = "trainer.checkpoint";
-/// @param iterations as TrainingSession has them.
+/// @param robot its fingerprint. @param iterations as TrainingSession has them.
 /// @throws CheckpointError if a session with these cannot go on from there.
-void RequireContinues(const Checkpoint& checkpoint, uint64_t seed, int iterations);
+void RequireContinues(const Checkpoint& checkpoint, uint64_t robot, uint64_t seed, int iterations);
 
 /// What a checkpoint has of the trainer. @throws std::invalid_argument if a policy is none.
 TrainerState TrainerStateOf(const Checkpoint& checkpoint);

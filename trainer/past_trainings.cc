@@ -1,6 +1,7 @@
 #include "trainer/past_trainings.h"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include "common/hash.h"
 
@@ -15,7 +16,11 @@ void PastTrainings::Begin(const TrainingSession& session) {
   past_.reset();
   const bool last = session.last();
   beginning_ = Hash(EncodeCheckpoint(session.MakeCheckpoint()), Hash(&last, sizeof last, run_));
-  past_ = LoadCheckpoint(FileOf(session.iteration()).string());
+  try {
+    past_ = LoadCheckpoint(FileOf(session.iteration()).string());
+  } catch (const CheckpointError& error) {  // it is trained again, and the file replaced
+    spdlog::warn("{}: {}", FileOf(session.iteration()).string(), error.what());
+  }
   const bool known = past_ && past_->identity == beginning_ && !past_->statuses.empty();
   if (!known) past_.reset();
 }

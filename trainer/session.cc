@@ -143,10 +143,10 @@ bool TrainingSession::Begin(const ParameterDistribution& distribution) {
       const ParameterSampler sample = [&](Random& random) { return distribution.Draw(random); };
       return trainer_.EvaluateHeldOut(policy, sample, Acceptance::kSimulators).mean;
     };
-    Choose(distribution.residual
-               ? acceptance_.Decide(iteration_, scatter,
-                                    {simulated(trainer_.policy()), simulated(*incumbent_policy_)})
-               : acceptance_.Trust(iteration_, scatter),
+    Choose(distribution.explained
+               ? acceptance_.Trust(iteration_, scatter)
+               : acceptance_.Decide(iteration_, scatter,
+                                    {simulated(trainer_.policy()), simulated(*incumbent_policy_)}),
            distribution.iteration);
   }
   distribution_ = distribution;
@@ -180,7 +180,7 @@ UpdateReport TrainingSession::Advance() {
     evaluation_ = trainer_.EvaluateHeldOut(sample, kHeldOut);
     complete_ = true;
     // The last one has no trial: it is trusted, or nothing but one that has had a trial is run.
-    if (finished() && trial_steps() > 0 && !(distribution_.residual && incumbent_policy_))
+    if (finished() && trial_steps() > 0 && (distribution_.explained || !incumbent_policy_))
       Choose(acceptance_.Trust(iteration_, 0), iteration_);
   }
   return last_;
@@ -233,6 +233,7 @@ Checkpoint TrainingSession::MakeCheckpoint() const {
   Checkpoint checkpoint;
   SetTrainerState(trainer_.state(), checkpoint);
   checkpoint.seed = seed_;
+  checkpoint.robot = description_.fingerprint;
   checkpoint.iteration = iteration_, checkpoint.iteration_updates = update_,
   checkpoint.complete = complete_;
   checkpoint.evaluation = evaluation_;
@@ -249,7 +250,7 @@ Checkpoint TrainingSession::MakeCheckpoint() const {
 }
 
 void TrainingSession::Restore(const Checkpoint& checkpoint) {
-  RequireContinues(checkpoint, seed_, iterations_);
+  RequireContinues(checkpoint, description_.fingerprint, seed_, iterations_);
   try {
     distribution_ = ParameterDistribution::FromMessage(checkpoint.distribution, description_);
     trainer_.Restore(TrainerStateOf(checkpoint));

@@ -23,10 +23,10 @@ void RequireSendable(const RobotDescription& robot);
 ///
 /// Each policy but the last begins its roll-out with a trial, without exploration ([training]
 /// `trial`), and is judged by it when the next distribution is there (Acceptance): it becomes the
-/// incumbent if it does better than the one of before or, where that distribution has no residual,
-/// in any case. The last one has no trial: without a residual it is the incumbent, with one the
-/// incumbent of before is what the robot is run with in the end. Training goes on from the newest
-/// policy whatever the trials say.
+/// incumbent if it does better than the one of before or, where that distribution explains the
+/// robot (ParameterDistribution::explained), in any case. The last one has no trial: where its
+/// distribution explains the robot it is the incumbent, else the one of before is what the robot is
+/// run with in the end. Training goes on from the newest policy whatever the trials say.
 ///
 /// Knows neither clocks nor who sends. Not thread-safe.
 class TrainingSession {

@@ -10,6 +10,7 @@
 #include "calibrator/diagnostics/witnesses.h"
 #include "calibrator/fit/curriculum.h"
 #include "calibrator/fit/one_step.h"
+#include "calibrator/fit/physical_columns.h"
 #include "calibrator/fit/recorded_window.h"
 #include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/inference/displaced.h"
@@ -129,7 +130,7 @@ class Test {
     }
     FitResiduals residuals = Residuals(witnesses.rows());
     residuals.errors = witnesses.Whiten(raw);
-    residuals.jacobian = witnesses.Whiten(Slopes());
+    residuals.jacobian = witnesses.Whiten(RawSlopes(raw));
     // What a candidate would change is asked where the reading before leads to. The reading itself
     // shares its noise with the error: where it says that a foot is deep in the ground the foot is
     // less so, the ground pushes less than predicted, and a right stiffness would look too large.
@@ -182,16 +183,16 @@ class Test {
   }
 
   // Of raw errors to the parameters, in units of the prior's standard deviations.
-  Eigen::MatrixXd Slopes() {
-    const Prior prior = PriorOf(robot_);
-    Eigen::MatrixXd at = nominal_.replicate(1, prior.size() + 1);
-    for (Eigen::Index i = 0; i < prior.size(); ++i) {
-      Eigen::VectorXd moved = mean_;
-      moved(i) += kSlopeDifference * prior.marginals()[static_cast<size_t>(i)].b;
-      at.col(i).head(physical_.size()) = robot_.ToPhysical(moved);
-    }
-    const Eigen::MatrixXd raw = errors_.Raw(at);
-    return (raw.leftCols(prior.size()).colwise() - raw.col(prior.size())) / kSlopeDifference;
+  Eigen::MatrixXd RawSlopes(const Eigen::VectorXd& at_mean) {
+    const Eigen::VectorXd sd = PriorGaussian(robot_).covariance.diagonal().cwiseSqrt();
+    const auto errors = [&](const Eigen::MatrixXd& from_mean) {
+      Eigen::MatrixXd at = nominal_.replicate(1, from_mean.cols());
+      at.topRows(physical_.size()) =
+          PhysicalColumns(robot_, (sd.asDiagonal() * from_mean).colwise() + mean_);
+      return errors_.Raw(at);
+    };
+    return Slopes(errors, Eigen::VectorXd::Zero(mean_.size()), at_mean,
+                  ProblemOf(robot_, errors_).block);
   }
 
   const TestedFit& fit_;

@@ -87,11 +87,16 @@ MethodResult ByApproximation(const MethodInput& input, const std::string& name,
   return result;
 }
 
+// Regression leads from the outcomes that were kept to what was observed. A distance of errors is
+// least where they are noise, and nowhere near the zero that it would have to be led to.
+bool CanAdjust(const MethodInput& input) { return input.options.discrepancy == "likelihood"; }
+
 MethodResult AbcRejection(const MethodInput& input) {
   return ByApproximation(input, "abc-rejection", [&](const Problem& problem, int64_t simulations) {
     RejectionOptions options;
     options.simulations = simulations;
     options.fraction = 0.05;
+    options.adjust = CanAdjust(input);
     RejectionDiagnostics found;
     Posterior posterior = InferByRejection(problem, options, input.options.seed, &found);
     return Inferred{
@@ -104,6 +109,7 @@ MethodResult AbcSmc(const MethodInput& input) {
   return ByApproximation(input, "abc-smc", [&](const Problem& problem, int64_t simulations) {
     SmcOptions options;
     options.simulations = simulations;
+    options.adjust = CanAdjust(input);
     options.population = static_cast<int>(std::clamp<int64_t>(simulations / 10, 20, 500));
     SmcDiagnostics found;
     Posterior posterior = InferBySmc(problem, options, input.options.seed, &found);

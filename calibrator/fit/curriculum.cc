@@ -44,7 +44,13 @@ class Curriculum {
     Eigen::VectorXd noise;  // that the best mode's errors are whitened by
     double best = -std::numeric_limits<double>::infinity();
     for (const Eigen::VectorXd& guess : guesses) {
-      modes.push_back(FitStage(one_step, guess, kNoiseRounds));
+      try {
+        modes.push_back(FitStage(one_step, guess, kNoiseRounds));
+      } catch (const std::invalid_argument& error) {  // it was found with a part of the windows
+        if (modes.empty() && &guess == &guesses.back()) throw;
+        result_.warnings.push_back(fmt::format("a mode is left out: {}", error.what()));
+        continue;
+      }
       if (modes.back().log_posterior <= best) continue;
       best = modes.back().log_posterior;
       noise = one_step.noise_sd();

@@ -240,6 +240,7 @@ GapFit CloseGap(const MethodInput& input, MethodResult all, const std::string& n
   fit.result = std::move(all);
   if (!fit.alarm.judged && KnowsLikelihood(input.options.method))
     Take(input, test.considered, &fit);
+  fit.explained = fit.alarm.judged && !fit.alarm.alarm;
   if (!fit.alarm.alarm) return fit;
   if (const std::string obstacle = Obstacle(input); !obstacle.empty()) {
     fit.gap.summary = kNotLearnt + obstacle;
@@ -251,6 +252,7 @@ GapFit CloseGap(const MethodInput& input, MethodResult all, const std::string& n
         "little to matter; the parameters are as unsure as what may be wrong with the model makes "
         "them",
         kNotLearnt, 100 * kLeastExplained);
+    fit.explained = true;
     Take(input, test.considered, &fit);
     return fit;
   }

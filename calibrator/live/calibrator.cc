@@ -19,8 +19,8 @@ std::span<const Rollout> Completed(const SimOpt::State& state) {
 }
 
 ParameterDistribution Distribution(const RobotDescription& robot, const SimOpt::State& state) {
-  return {state.iteration, robot.parameters, state.distribution, state.residual,
-          Starts(Completed(state))};
+  return {state.iteration, robot.parameters, state.distribution,
+          state.residual,  state.explained,  Starts(Completed(state))};
 }
 
 // An iteration's identity is its newest episode's start: a time that live run and replay share.
@@ -107,7 +107,8 @@ Findings IterationFindings(const RobotDescription& robot, const SimOpt& simopt,
   findings.gap.residual = state.residual;
   findings.starts = Starts(state.rollouts);
   findings.warnings = report.warnings;
-  findings.loop = {report.iteration, Time(state), report.kl, report.ess, report.temperature};
+  findings.loop = {report.iteration, Time(state),    report.kl,   report.ess, report.temperature,
+                   state.explained,  state.informed, state.alarm, state.gap};
   return findings;
 }
 

@@ -28,8 +28,8 @@ using plumb::ToJson;  // of vectors and roll-outs, beside those below
 
 // Version 2: without the method used, its warnings and a search's samples; 3: without a residual; 4
 // to 6: with another; 7: without a checksum; 8: without the number of roll-outs that are forgotten;
-// 9: without information
-constexpr FileKind kKind{"PLUMBCAL", 10, "a calibrator's checkpoint"};
+// 9: without information; 10: without whether the robot is explained
+constexpr FileKind kKind{"PLUMBCAL", 11, "a calibrator's checkpoint"};
 
 Informed InformedFrom(const std::string& name) {
   for (const Informed informed : kAllInformed) {
@@ -216,9 +216,7 @@ std::vector<Rollout> LoadRollouts(const std::filesystem::path& folder,
 CalibrationCheckpoint::CalibrationCheckpoint(std::filesystem::path folder,
                                              const RobotDescription& robot, uint64_t seed)
     : folder_(std::move(folder)), robot_(robot), seed_(seed) {
-  std::error_code error;
-  std::filesystem::create_directories(folder_, error);
-  if (error) throw std::runtime_error(folder_.string() + ": " + error.message());
+  MakeFolder(folder_);
   RemoveLeftovers(folder_, ".checkpoint");
 }
 
@@ -245,6 +243,7 @@ void CalibrationCheckpoint::Save(const SimOpt::State& state) {
                {"search", ToJson(state.search)},
                {"warnings", state.warnings},
                {"residual", ToJson(state.residual, robot_)},
+               {"explained", state.explained},
                {"alarm", state.alarm},
                {"gap", state.gap},
                {"informed", Name(state.informed)},
@@ -276,6 +275,7 @@ std::optional<SimOpt::State> CalibrationCheckpoint::Load() const {
     ReadSamples(j.at("search"), &state.search);
     state.warnings = j.at("warnings").get<std::vector<std::string>>();
     state.residual = ResidualFrom(j.at("residual"), robot_);
+    state.explained = j.at("explained");
     state.alarm = j.at("alarm"), state.gap = j.at("gap");
     state.informed = InformedFrom(j.at("informed"));
     state.information = InformationFrom(j.at("information"), state.search.distribution.mean.size());

@@ -179,6 +179,7 @@ void SimOpt::Infer() {
     const GapFit fit = RunFromWhereItIs();
     const MethodResult& result = fit.result;
     state_.residual = fit.gap.residual, state_.informed = fit.gap.informed;
+    state_.explained = fit.explained;
     state_.information = fit.information;
     state_.alarm = fit.alarm.alarm ? fit.alarm.summary : "";
     state_.gap = fit.alarm.judged ? fit.gap.summary : fit.alarm.summary;
@@ -191,6 +192,7 @@ void SimOpt::Infer() {
     state_.warnings = result.warnings;
   } catch (const std::invalid_argument& error) {
     state_.warnings = {std::string("the distribution stays as it is: ") + error.what()};
+    state_.explained = false;
   }
 }
 

@@ -89,6 +89,7 @@ class SimOpt {
     std::string used = "prior";
     /// that its simulators lack; null = nothing, or nothing is known of it
     std::shared_ptr<const Residual> residual;
+    bool explained = false;              ///< see ParameterDistribution
     Informed informed = Informed::kAll;  ///< which steps the parameters are learnt from
     /// Fisher information of the coordinates that the distribution rests on, n x n; empty = of a
     /// search, or nothing was recorded

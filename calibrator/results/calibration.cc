@@ -1,6 +1,7 @@
 #include "calibrator/results/calibration.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <chrono>
 #include <cmath>
@@ -10,6 +11,7 @@
 #include "calibrator/design/excitation.h"
 #include "calibrator/diagnostics/finer_steps.h"
 #include "calibrator/diagnostics/holdout.h"
+#include "calibrator/diagnostics/shifted_efforts.h"
 #include "calibrator/fit/likelihood_methods.h"
 #include "calibrator/fit/methods.h"
 #include "calibrator/fit/physical_columns.h"
@@ -31,6 +33,9 @@ constexpr char kCure[] =
 // Times the error without it; less may be chance.
 constexpr double kHarm = 1.1;
 
+// Share of what a velocity changes by in a step, root mean square.
+constexpr double kMuch = 0.1;
+
 class Calibration {
  public:
   Calibration(const RobotDescription& robot, std::span<const Log> logs,
@@ -39,6 +44,8 @@ class Calibration {
     for (const Log& log : logs) own_.push_back(Motion(log));
     for (const std::vector<Rollout>& own : own_)
       rollouts_.insert(rollouts_.end(), own.begin(), own.end());
+    still_ = ForgetStill(robot, &rollouts_);
+    for (std::vector<Rollout>& own : own_) ForgetStill(robot, &own);
     if (CountTransitions(rollouts_) == 0)
       throw std::invalid_argument("there is no transition to calibrate with");
   }
@@ -68,7 +75,12 @@ class Calibration {
     CrossValidate(result);
     if (findings_.gap.residual) findings_.gap.summary += kCure;
     JudgeSubstep(fit);
+    JudgeRows(fit.view);
     CompareLogs();
+    if (!still_.empty())
+      findings_.warnings.push_back(
+          fmt::format("nothing is learnt from what never changed, which may have read nothing: {}",
+                      fmt::join(still_, ", ")));
     if (std::string contradiction = Contradiction(findings_, robot_); !contradiction.empty())
       findings_.warnings.insert(findings_.warnings.begin(), std::move(contradiction));
     findings_.seconds = SecondsSince(start);
@@ -209,6 +221,28 @@ class Calibration {
     if (!too_long.empty()) findings_.warnings.push_back(too_long);
   }
 
+  // A driver's log says when efforts acted. A table may have them in another row; where that makes
+  // errors they are as large as what efforts do.
+  void JudgeRows(const OneStepView& view) {
+    if (!KnowsLikelihood(options_.method) || view.noise_known) return;
+    const Eigen::Index n = robot_.num_velocities();
+    Eigen::ArrayXd squares = Eigen::ArrayXd::Zero(n), count = squares;
+    for (const Rollout& rollout : rollouts_) {
+      for (const Transition& t : rollout.transitions) {
+        const Eigen::ArrayXd change = (t.next_v - t.v).array().square();
+        const auto known = change.isFinite();
+        squares += known.select(change, 0);
+        count += known.cast<double>();
+      }
+    }
+    const Eigen::ArrayXd unexplained = view.noise_sd.tail(n).array().square();
+    if (!(unexplained > kMuch * kMuch * squares / count.max(1)).any()) return;
+    findings_.efforts =
+        FindEffortShift(model_, rollouts_, options_.execution, &findings_.diagnostic_steps);
+    if (findings_.efforts.rows == 0) return;
+    findings_.warnings.insert(findings_.warnings.begin(), DescribeShift(findings_.efforts));
+  }
+
   // Each log on its own: are they of the same robot?
   void CompareLogs() {
     Agreement& agreement = findings_.agreement;
@@ -243,6 +277,7 @@ class Calibration {
   std::vector<std::vector<Rollout>> own_;  // of each log, as the method takes it
   const CalibrationOptions& options_;
   std::vector<Rollout> rollouts_;
+  std::vector<std::string> still_;  // columns
   Eigen::VectorXd mean_;
   Findings findings_;
 };

@@ -10,6 +10,7 @@
 #include "calibrator/diagnostics/identifiability.h"
 #include "calibrator/diagnostics/log_agreement.h"
 #include "calibrator/diagnostics/misspecification.h"
+#include "calibrator/diagnostics/shifted_efforts.h"
 #include "calibrator/fit/curriculum.h"
 #include "calibrator/fit/window_errors.h"
 #include "calibrator/gap/gap.h"
@@ -24,6 +25,10 @@ struct LoopUpdate {
   double kl;           ///< D_KL(after || before) of the moments, summed over the updates [nat]
   double ess;          ///< effective sample size of the last update; NaN = draws no samples
   double temperature;  ///< of the last update; 1 = Bayes' rule
+  bool explained;      ///< see ParameterDistribution
+  Informed informed;   ///< which steps the parameters are learnt from
+  /// what the model does not explain, and what was done about it, see SimOpt::State
+  std::string alarm, gap;
 };
 
 /// All that a calibration has found. Plain data: not thread-safe.
@@ -57,12 +62,12 @@ struct Findings {
   /// states (q, v) of the robot for simulated episodes to begin with, of the loop only
   std::vector<Eigen::VectorXd> starts;
   Agreement agreement;
-  std::string check;  ///< how the posterior's shape was verified, in words
+  EffortShift efforts;  ///< rows 0: they act in the rows in which they stand, or nobody has looked
+  std::string check;    ///< how the posterior's shape was verified, in words
   std::vector<std::string> warnings;
   double seconds = 0;  ///< wall time
-  /// Of plumb-calibrator only, which fits and looks no further: stages, noise, advice, holdout,
-  /// misspecification, the gap but for its residual, agreement, check and the counts of simulations
-  /// then say nothing.
+  /// Of plumb-calibrator only: stages, noise, advice, holdout, misspecification, the gap but for
+  /// its residual, agreement, check and the counts of simulations then say nothing.
   std::optional<LoopUpdate> loop;
 };
 

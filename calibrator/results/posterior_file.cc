@@ -156,7 +156,11 @@ json ToJson(const LoopUpdate& update) {
           {"utime", update.utime},
           {"kl", update.kl},
           {"ess", update.ess},
-          {"temperature", update.temperature}};
+          {"temperature", update.temperature},
+          {"explained", update.explained},
+          {"informed", Name(update.informed)},
+          {"alarm", update.alarm},
+          {"gap", update.gap}};
 }
 
 json Interval(const Summary& summary) {

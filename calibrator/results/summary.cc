@@ -63,6 +63,7 @@ Eigen::MatrixXd Draw(const Findings& findings, const RobotDescription& robot) {
 
 bool Trustworthy(const Findings& findings) {
   return findings.holdout.better && !findings.misspecification.alarm && findings.agreement.agree &&
+         findings.efforts.rows == 0 &&
          (DistancesFromPrior(findings).array().abs() <= kContradiction).all();
 }
 

@@ -31,7 +31,8 @@ struct Summary {
 Summary Summarise(const Findings& findings, const RobotDescription& robot);
 
 /// Whether findings are to be relied on, as plumb calibrate --strict asks: better than the prior on
-/// motion not seen, no alarm, the logs agree, and there is no Contradiction. Thread-safe.
+/// motion not seen, no alarm, the logs agree, efforts stand in their rows, and there is no
+/// Contradiction. Thread-safe.
 bool Trustworthy(const Findings& findings);
 
 /// How far the posterior's mean is from the prior's, in the prior's standard deviations of each

@@ -69,8 +69,10 @@ bool Driver::Agree(const SecondEncoder& second, Reason& why) const noexcept {
   double difference = sensor.newest().position - joint.latest.position;
   // Neither knows how often the joint has turned round.
   if (joint.turns) difference = std::remainder(difference, 2 * std::numbers::pi);
-  // They are not of one time.
-  const double most = second.tolerance + std::abs(joint.latest.velocity) * settings_.stale_after;
+  // They are not of one time: a sensor that is slow may be fresh for longer than stale_after.
+  const double apart =
+      std::max(settings_.stale_after, Seconds(std::abs(joint.measured_at - sensor.taken_at())));
+  const double most = second.tolerance + std::abs(joint.latest.velocity) * apart;
   if (std::abs(difference) <= most) return true;
   why.Set("{}: {} measures {:.4g}, its motor {:.4g}, which differ by more than {:.3g}", joint.name,
           sensor.name(), sensor.newest().position, joint.latest.position, most);

@@ -15,11 +15,7 @@ FlightRecorder::FlightRecorder(const std::filesystem::path& folder, const BusDes
                                size_t frames, Report report)
     : folder_(folder), name_(bus.name), bus_(bus.url), report_(std::move(report)) {
   if (folder_.empty()) return;
-  std::error_code error;
-  std::filesystem::create_directories(folder_, error);
-  if (error)
-    throw std::runtime_error(
-        fmt::format("{}: cannot be written: {}", folder_.string(), error.message()));
+  MakeFolder(folder_);
   std::replace(bus_.begin(), bus_.end(), ' ', '_');
   for (Tape& tape : tapes_) tape.entries.resize(std::max<size_t>(frames, 1));
   writer_ = std::thread([this] { Serve(); });

@@ -17,6 +17,8 @@ constexpr double kRadiansPerTurn = 2 * std::numbers::pi;
 constexpr double kSilentIntervals = 2.5;  // one heartbeat may be lost
 constexpr int64_t kTogether = 1'000'000;  // [us] between silence and jump of one restart
 constexpr double kLeastJump = 0.05;       // [turns] beyond what the velocities explain
+// [s] that velocities explain: where a joint has been in a longer silence they do not tell
+constexpr double kExplained = 0.25;
 
 const Layout* Find(uint32_t command) {
   switch (command) {
@@ -91,7 +93,7 @@ FrameUse CanSimpleReports::OnAddress(const FieldValues& v) noexcept {
 FrameUse CanSimpleReports::OnEstimates(const FieldValues& v, int64_t now) noexcept {
   const MotorEstimate next{v[0] * kRadiansPerTurn, v[1] * kRadiansPerTurn};
   if (estimated_) {
-    const double seconds = Seconds(now - estimated_at_);
+    const double seconds = std::min(kExplained, Seconds(now - estimated_at_));
     const double turned = std::abs(next.position - estimate_.position) / kRadiansPerTurn;
     const double fastest =
         std::max(std::abs(next.velocity), std::abs(estimate_.velocity)) / kRadiansPerTurn;

@@ -4,13 +4,13 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cctype>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "common/nearest_name.h"
+#include "common/small_letters.h"
 #include "drivers/protocols/registry.h"
 #include "robot/place_in_file.h"
 
@@ -27,12 +27,6 @@ constexpr Maker kMakers[] = {
 };
 
 constexpr size_t kAlike = 2;  // letters that may differ
-
-std::string InSmallLetters(std::string_view text) {
-  std::string small(text);
-  std::ranges::transform(small, small.begin(), [](unsigned char c) { return std::tolower(c); });
-  return small;
-}
 
 /// "; did you mean ...?" and the like, where there is an idea. @param known not empty.
 std::string Meant(std::string_view name, const std::vector<std::string>& known) {

@@ -17,6 +17,7 @@ constexpr int kZeroFrames = 3;  // frames of zero gains before "enter"
 constexpr int kEnters = 2;      // one of them may be lost on the bus
 constexpr int kRepliesToArm = 2;
 constexpr double kUneven = 0.01;  // [s] by which replies may come early or late
+constexpr double kUnmoved = 0.1;  // [rad]
 
 enum class Step { kRest, kZeros, kEnter, kAwait, kArmed, kDisarming };
 
@@ -41,8 +42,7 @@ class MitMotor : public AnsweringMotor<Step> {
     if (frame.length < kPlain || frame.length > kWithTemperature) return FrameUse::kRejected;
     const auto values = DecodePayload(replies_by_length_[frame.length - size_t{kPlain}], frame);
     if (!values) return FrameUse::kRejected;
-    const bool continuous = present() && now - answered() <= heartbeat_timeout();
-    Track((*values)[1], continuous ? now - answered() : -1, now);
+    Track((*values)[1], now);
     estimate_.velocity = (*values)[2];
     torque_estimate_ = (*values)[3];
     if (frame.length == kWithVoltage) readings_.bus_voltage = (*values)[4];
@@ -122,17 +122,22 @@ class MitMotor : public AnsweringMotor<Step> {
     if (step() == Step::kEnter && sent() >= kEnters) Enter(Step::kAwait, now);
   }
 
-  /// @param raw [rad] position of a reply. @param dt [us] since the one before, -1 = too long ago
-  /// to count turns from there.
-  void Track(double raw, int64_t dt, int64_t now) noexcept {
+  /// Turns are counted from one reply to the next. In a silence the motor may have lost its power,
+  /// and with it the turns: where it then is elsewhere, nobody knows whether it was turned or
+  /// counts from elsewhere.
+  /// @param raw [rad] position of a reply.
+  void Track(double raw, int64_t now) noexcept {
     const double step = std::remainder(raw - raw_, Period(ranges_));
+    const int64_t dt = now - answered();
     const bool displaced = std::exchange(displaced_, false);
+    const bool silent = !present() || dt > heartbeat_timeout();
     raw_ = raw;
-    if (dt < 0) {
+    if (!heard() || (silent && displaced)) {
       estimate_.position = raw;
       return;
     }
-    if (!displaced && std::abs(step) > ranges_.velocity * (Seconds(dt) + kUneven)) {
+    const double explained = silent ? kUnmoved : ranges_.velocity * (Seconds(dt) + kUneven);
+    if (!displaced && std::abs(step) > explained) {
       LosePlace();
       Fail(now,
            "its position jumped by {:.3g} rad in {:.3g} ms: it has restarted, or lost its place",

@@ -47,7 +47,10 @@ double StepOf(uint32_t number, int format) {
 }
 int BytesOf(int format) { return format == kInt8 ? 1 : format == kInt16 ? 2 : 4; }
 
-bool IsCounted(uint32_t number) { return ScaleOf(number).of_int8 == 1 && number != kTemperature; }
+bool IsCounted(uint32_t number) {
+  const Scale scale = ScaleOf(number);
+  return scale.of_int8 == 1 && scale.of_int16 == 1 && scale.of_int32 == 1;
+}
 
 }  // namespace
 

@@ -7,7 +7,9 @@
 namespace plumb {
 
 /// Finds out from a drive's own uptime that it has begun anew: it has lost its power, and maybe its
-/// place. Not thread-safe; does not allocate.
+/// place. Either it is less than it should be, or, after more than 25 days, when the difference has
+/// gone round, it is no longer than the time since the answer before. Not thread-safe; does not
+/// allocate.
 class UptimeWatch {
  public:
   /// @param slack [us] by which its clock may be behind ours, frames that waited for us included;
@@ -18,9 +20,11 @@ class UptimeWatch {
   void OnUptime(uint32_t uptime, int64_t now) noexcept {
     if (newest_) {
       const int64_t passed = now - newest_->at;
-      const auto expected = newest_->uptime + static_cast<uint32_t>(passed / 1000);
-      const int64_t behind = int64_t{static_cast<int32_t>(expected - uptime)} * 1000;
-      if (behind > slack_ + passed / kDrift) restart_ = uptime;
+      const auto behind = newest_->uptime + static_cast<uint32_t>(passed / 1000) - uptime;  // [ms]
+      const int64_t slack = slack_ + passed / kDrift;
+      const bool less = int64_t{static_cast<int32_t>(behind)} * 1000 > slack;
+      const bool since = int64_t{behind} * 1000 > slack && int64_t{uptime} * 1000 <= passed;
+      if (less || since) restart_ = uptime;
     }
     newest_ = {uptime, now};
   }

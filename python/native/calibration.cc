@@ -195,8 +195,11 @@ void BindCalibration(py::module_& module) {
           [](const Calibration& self) {
             const Findings& found = self.findings;
             return Distribution{self.robot,
-                                {1, self.robot->description().parameters, found.posterior,
-                                 found.gap.residual, found.starts}};
+                                {.iteration = 1,
+                                 .parameters = self.robot->description().parameters,
+                                 .mixture = found.posterior,
+                                 .residual = found.gap.residual,
+                                 .starts = found.starts}};
           },
           "The posterior, with what its simulators lack: what load_posterior makes of the file.")
       .def("json", &Calibration::Json, "The text of posterior.json (docs/posterior.md).")

@@ -13,6 +13,8 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "common/small_letters.h"
+
 namespace plumb {
 namespace {
 
@@ -120,8 +122,7 @@ std::vector<Vector3d> OfObj(const std::string& text) {
 }  // namespace
 
 bool IsMeshFormat(const std::string& file) {
-  std::string ending = fs::path(file).extension().string();
-  for (char& letter : ending) letter = static_cast<char>(std::tolower(letter));
+  const std::string ending = InSmallLetters(fs::path(file).extension().string());
   return ending == ".stl" || ending == ".obj";
 }
 

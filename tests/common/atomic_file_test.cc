@@ -64,5 +64,14 @@ TEST_CASE("what cannot be written is told, and leaves nothing") {
   CHECK(std::distance(fs::directory_iterator(folder.path()), {}) == 1);
 }
 
+TEST_CASE("a folder is made with those around it, and one that cannot be is named") {
+  const TemporaryFolder folder;
+  for (int again = 0; again < 2; ++again) MakeFolder(folder / "a/b");
+  CHECK(fs::is_directory(folder / "a/b"));
+  WriteAtomically(folder / "file", "x");
+  CHECK_THROWS_WITH(MakeFolder(folder / "file/b"),
+                    folder / "file/b" + ": cannot be made: Not a directory");
+}
+
 }  // namespace
 }  // namespace plumb

@@ -54,7 +54,7 @@ const residual = { condition: 0, num_inputs: 2, num_outputs: 2, num_centres: 3, 
 const training = (iteration, update) => ({
   utime: BEGIN + iteration * 12e6, iteration, update, updates: 40, steps: (iteration * 40 + update) * 1600, dropped_episodes: iteration, mean_return: -1200 * Math.exp(-(update + 20 * iteration) / 25) - 150, kl: 0.0075 + 0.002 * Math.sin(update), surrogate_gain: 0.03 * Math.exp(-update / 60),
   explained_variance: 1 - Math.exp(-update / 9), entropy: 1.42 - 0.02 * update - 0.03 * iteration, complete: update === 40, evaluation_return: update === 40 ? -260 + 18 * iteration : null, evaluation_tenth: update === 40 ? -420 + 24 * iteration : null, evaluation_worst: update === 40 ? -610 + 20 * iteration : null,
-  incumbent: iteration - 1, incumbent_since: Math.max(0, iteration - 1), decision: iteration ? `policy ${iteration - 1} trusted: trained without a residual` : "",
+  incumbent: iteration - 1, incumbent_since: Math.max(0, iteration - 1), decision: iteration ? `policy ${iteration - 1} trusted: the model explains the robot` : "",
 });
 
 const controller = (policy_iteration, phase = 3, purpose = 0) => ({ utime: BEGIN, policy_iteration, phase, reason: "", step: 171, episode_return: -365.2, num_episodes: 3, returns: [-300 + 20 * policy_iteration, -280 + 12 * policy_iteration, -330 + 25 * policy_iteration], steps: [200, 100, 150], late_rate: [-0.5, -0.25, -0.5], fell: [false, false, true], episodes_wanted: 3, purpose, episodes_aborted: 4 });

@@ -122,6 +122,19 @@ TEST_CASE("resting is judged by height and velocity, with hysteresis") {
   CHECK(rests(0.02, 0, 0.02));
   CHECK_FALSE(rests(0.02, 2, 0.02));
   CHECK(rests(0.02, 1.5, 0.02, 1.5));
+  // What slides does not rest, unless nobody knows how fast it does.
+  test.Restart();
+  const auto slides = [&](double slide, double slide_sd) {
+    return test.Judge(Motion{.height = 0,
+                             .height_sd = 0,
+                             .rise = 0,
+                             .rise_sd = 0,
+                             .slide = slide,
+                             .slide_sd = slide_sd});
+  };
+  CHECK_FALSE(slides(2, 0.1));
+  CHECK(slides(2, 3));
+  CHECK(slides(0.3, 0.1));
 }
 
 TEST_CASE("a robot that does not touch the ground has no contacts") {

@@ -156,6 +156,63 @@ TEST_CASE("on ground that gives way a lot a foot in the air does not rest all th
   CHECK_FALSE(walker.filter.astray());
 }
 
+// One leg as stiff as a rod, on ground that gives way by a centimetre under it.
+TEST_CASE("who lands hard keeps its height on ground that gives way") {
+  LegOdometry::Settings s = Settings();
+  s.normal = Vector3d::UnitY();
+  s.give = 1e-3, s.settles_in = 1.0 / 30, s.ground_sd = 0.018;
+  const double speed = GENERATE(1.0, 1.5, 2.0), leg = 0.5;
+  LegOdometry filter(s, 1);
+  std::vector<LegOdometry::Foot> feet(1);
+  feet[0].radius = kRadius;
+  feet[0].centre = (kRadius - leg) * Vector3d::UnitZ();
+  double z = leg - s.give * kGravity, v = 0;
+  filter.Restart(LegOdometry::Beginning::kStands, Vector3d::Zero(), Quaterniond::Identity(), feet);
+  double worst = 0, deepest = 0, landed = -1;
+  for (int i = 0; i < 400; ++i) {
+    double felt = 0;
+    for (int k = 0; k < 50; ++k) {
+      const double dt = kPeriod / 50, in = leg - z;
+      double force = in > 0 ? std::max(0.0, (in - s.settles_in * v) / s.give) : 0;
+      if (i == 200) force = kGravity + speed / kPeriod;  // jumps
+      v += dt * (force - kGravity), z += dt * v;
+      felt += force / 50;
+    }
+    filter.Predict(kPeriod, Vector3d::Zero(), felt * Vector3d::UnitZ());
+    filter.Correct(feet);
+    if (i > 210 && landed < 0 && z < leg) landed = i;
+    if (i > 210) deepest = std::max(deepest, leg - z);
+    if (landed > 0 && i > landed + 6) worst = std::max(worst, std::abs(filter.position().z() - z));
+  }
+  INFO("landed at " << speed << " m/s, pressed the ground in by " << deepest << " m, height off by "
+                    << worst << " m");
+  CHECK(landed > 0);
+  CHECK(deepest > 0.02);
+  CHECK(worst < 0.012);
+  CHECK_FALSE(filter.astray());
+}
+
+TEST_CASE("a foot that grazes the ground in swinging by does not rest on it") {
+  Walker walker(5, 3);
+  walker.sway = 0;
+  walker.Start();
+  walker.Run(1);
+  for (int i = 0; i < 20; ++i) walker.places[0].z() = 0.2, walker.Step();
+  REQUIRE_FALSE(walker.filter.rests(0));
+  walker.places[0].z() = kRadius;
+  for (const double speed : {3.0, 0.0}) {
+    for (int i = 0; i < 8; ++i) {
+      walker.places[0].x() += speed * kPeriod;
+      walker.filter.Predict(kPeriod, walker.rate_bias,
+                            kGravity * Vector3d::UnitZ() + walker.acceleration_bias);
+      auto feet = walker.Feet();
+      feet[0].velocity.x() += speed;
+      walker.filter.Correct(feet);
+    }
+    CHECK(walker.filter.rests(0) == (speed == 0));
+  }
+}
+
 TEST_CASE("in a plane nothing leaves it") {
   LegOdometry::Settings s = Settings();
   s.normal = Vector3d::UnitY();

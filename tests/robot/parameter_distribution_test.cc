@@ -134,7 +134,15 @@ TEST_CASE("A message survives the round trip bit by bit") {
   CHECK(again.weight == message.weight);
   CHECK(again.mean == message.mean);
   CHECK(again.covariance == message.covariance);
+  CHECK(again.explained == message.explained);
   CHECK(std::isnan(again.kl));
+}
+
+TEST_CASE("Whether its simulators explain the robot is told, and no residual beside it") {
+  ParameterDistribution distribution = ParameterDistribution::Prior(Robot());
+  CHECK_FALSE(ParameterDistribution::FromMessage(distribution.ToMessage(), Robot()).explained);
+  distribution.explained = true;
+  CHECK(ParameterDistribution::FromMessage(distribution.ToMessage(), Robot()).explained);
 }
 
 TEST_CASE("Hostile distributions are refused with a reason") {

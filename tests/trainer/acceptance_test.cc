@@ -148,10 +148,10 @@ TEST_CASE("a decision says who, why and how sure") {
   CHECK(Summary({3, 0, false, false, 0.1, 846, 1846, {NAN, NAN}}) ==
         "policy 3 not accepted (846; incumbent 0: 1846; better with 10 %)");
   CHECK(Summary({3, 2, true, true, 0.5, 1850, 1846, {NAN, NAN}}) ==
-        "policy 3 trusted: trained without a residual (1850; incumbent 2: 1846; better with 50 "
+        "policy 3 trusted: the model explains the robot (1850; incumbent 2: 1846; better with 50 "
         "%)");
   CHECK(Summary({3, 2, true, true, NAN, NAN, 1846, {NAN, NAN}}) ==
-        "policy 3 trusted: trained without a residual");
+        "policy 3 trusted: the model explains the robot");
   CHECK(Summary({3, 2, false, false, 0.1, 2951, 2846, {1400, 1900}}) ==
         "policy 3 not accepted (2951; incumbent 2: 2846; simulated 1400, 1900; better with 10 %)");
   CHECK(Summary({0, 0, false, false, 0, 1846, 1846, {NAN, NAN}}) == "policy 0 is the first (1846)");

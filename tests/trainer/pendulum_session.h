@@ -39,6 +39,13 @@ inline ParameterDistribution Distribution(int iteration) {
   return distribution;
 }
 
+/// Of a model that was asked, and explains the robot.
+inline ParameterDistribution Explaining(int iteration) {
+  ParameterDistribution distribution = Distribution(iteration);
+  distribution.explained = true;
+  return distribution;
+}
+
 /// Of a model that does not explain the robot.
 inline ParameterDistribution Lacking(int iteration) {
   ResidualFunction function;

@@ -92,7 +92,7 @@ TEST_CASE("Where the model is wrong, what does best on the robot is what it is r
 
 TEST_CASE("Where the model explains the robot the newest policy is trusted") {
   TrainingSession session = NewSession(4, 2);
-  const auto policies = RunAll(session, {-1, -3}, Distribution);
+  const auto policies = RunAll(session, {-1, -3}, Explaining);
   CHECK(policies[2].trained_in == 2);
   CHECK(policies[2].weight == session.MakeCheckpoint().policy.weight);
   const training_status_t status = session.Status();
@@ -101,6 +101,13 @@ TEST_CASE("Where the model explains the robot the newest policy is trusted") {
   CHECK(status.challenger == 2);
   CHECK(status.decision.find("policy 2 trusted") == 0);
   CHECK(std::isnan(status.probability));  // it has not been tried
+}
+
+TEST_CASE("Where nobody could tell whether the model explains the robot, trials decide") {
+  TrainingSession session = NewSession(4, 3);
+  const auto policies = RunAll(session, {-1, -3, -2}, Distribution);
+  CHECK(policies[3].trained_in == 0);
+  CHECK(session.Status().decision.find("policy 2 not accepted") == 0);
 }
 
 /// Of the prior a good third cannot be simulated.

@@ -195,6 +195,7 @@ export interface parameter_distribution_t {
   mean: (number | null)[];
   num_covariances: number;
   covariance: (number | null)[];
+  explained: boolean;
   num_residuals: number;
   residual: residual_function_t[];
   residual_margin: number | null;

@@ -86,6 +86,7 @@ TEST_CASE("a right model keeps its posterior to the bit, and lacks nothing") {
   const auto log = RandomLog(robot, {}, 400, 3);
   const auto [alone, gap] = Close(robot, log);
   CHECK_FALSE(gap.alarm.alarm);
+  CHECK(gap.explained);
   CHECK_FALSE(gap.gap.residual);
   CHECK(gap.gap.summary.empty());
   CHECK(gap.gap.informed == Informed::kAll);
@@ -230,6 +231,7 @@ TEST_CASE("where residuals are switched off an alarm changes nothing, and it is 
   const auto log = RandomLog(robot, {{{"friction/pivot", 0.5}}, 0, 1e-3}, 300, 3);
   const auto [alone, fit] = Close(robot, log, false);
   CHECK(fit.alarm.alarm);
+  CHECK_FALSE(fit.explained);
   CHECK_FALSE(fit.gap.residual);
   CHECK(fit.result.posterior == alone.posterior);
   CHECK(fit.gap.summary == "what the model lacks is not learnt: residuals are switched off");
@@ -252,6 +254,7 @@ TEST_CASE("of differences for velocities the posterior is as wide as what may be
   const GapFit fit = CloseGap(input, alone, "why");
   CHECK_FALSE(fit.alarm.alarm);
   CHECK_FALSE(fit.alarm.judged);
+  CHECK_FALSE(fit.explained);
   CHECK(fit.alarm.summary == "why");
   CHECK_FALSE(fit.gap.residual);
   // Off by so many standard deviations at most; the truth is the prior's mean.

@@ -158,6 +158,9 @@ TEST_CASE("what an iteration has found is a posterior, and the same bytes after 
   CHECK(j["seed"] == 3);
   CHECK(j["loop"]["iteration"] == 1);
   CHECK(j["loop"]["kl"] == report->kl);
+  CHECK(j["loop"]["explained"] == true);
+  CHECK(j["loop"]["informed"] == "all");
+  CHECK(j["loop"]["alarm"] == "");
   CHECK(j["discrepancy"] == report->discrepancy);
   CHECK(j["identifiability"]["words"] == report->identifiability.summary);
   CHECK(j["transitions"] == simopt.state().rollouts[0].transitions.size());
@@ -196,22 +199,25 @@ TEST_CASE("all modes of a posterior are kept in checkpoints and told to the trai
   second.mean(0) += 0.5;
   state.distribution = {{0.25, 0.75}, {PriorGaussian(robot), second}};
   state.ess = NAN;
+  state.explained = true;
   const ParameterDistribution told =
       ParameterDistribution::FromMessage(DistributionMessage(robot, state, 1, nullptr), robot);
   REQUIRE(told.mixture.components.size() == 2);
   CHECK(told.mixture.weights[1] == 0.75);
   CHECK(told.mixture.components[1].mean == second.mean);
+  CHECK(told.explained);
   const TemporaryFolder folder;
   CalibrationCheckpoint checkpoint(folder.path(), robot, 1);
   checkpoint.Save(state);
   const auto loaded = checkpoint.Load();
   REQUIRE(loaded);
   CHECK(SameBits(loaded->distribution, state.distribution));
+  CHECK(loaded->explained);
   CHECK(std::isnan(loaded->ess));
   std::string bytes = ReadFile(folder / "calibration.checkpoint");
   bytes[8] = 7;  // the version
   std::ofstream(folder / "calibration.checkpoint") << bytes;
-  CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("has version 7, not 10"));
+  CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("has version 7, not 11"));
 }
 
 TEST_CASE("what is said of an iteration stays as it is while the next one is under way") {
@@ -269,7 +275,7 @@ TEST_CASE("what the simulators lack is told to the trainer again after a resumpt
   CHECK(told(*loaded) == told(state));
   CHECK(told(*loaded) != told(simopt.state()));
 
-  const FileKind kind{"PLUMBCAL", 10, "a calibrator's checkpoint"};
+  const FileKind kind{"PLUMBCAL", 11, "a calibrator's checkpoint"};
   const std::string bytes = ReadFile(folder / "calibration.checkpoint");
   const std::string text(CheckedContent(kind, bytes));
   const size_t at = text.find("\"residual\":\"") + 12;

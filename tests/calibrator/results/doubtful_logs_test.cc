@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "calibrator/motion/differences.h"
 #include "calibrator/results/summary.h"
 #include "sim/simulator.h"
 #include "tests/calibrator/results/swinging.h"
@@ -65,6 +66,39 @@ TEST_CASE(
   CHECK_THAT(said, Catch::Contains(robot.parameters[1].name + " (11 sd more than its mean)"));
   CHECK_THAT(said, !Catch::Contains(robot.parameters[0].name));
   CHECK_FALSE(Trustworthy(findings));
+}
+
+TEST_CASE("efforts that stand a row late are found, and nothing that they teach is trusted") {
+  Log log = Swinging("late", kSwingingTruth, 6, 60);
+  CHECK(Of({log}).efforts.rows == 0);
+  for (Rollout& rollout : log.rollouts) {
+    auto& t = rollout.transitions;
+    for (size_t k = t.size(); k-- > 1;) t[k].efforts = t[k - 1].efforts;
+  }
+  const Findings f = Of({log});
+  INFO(Words(f));
+  CHECK(f.efforts.rows == 1);
+  CHECK(f.efforts.left < 0.2);
+  CHECK_THAT(Words(f),
+             Catch::Contains("efforts stand in the wrong rows: with those of the row after"));
+  CHECK_FALSE(Trustworthy(f));
+}
+
+TEST_CASE("of a column that never changed nothing is learnt") {
+  const RobotDescription robot = Pendulum();
+  Log log = Swinging("still", kSwingingTruth, 6, 40);
+  for (Rollout& rollout : log.rollouts) {
+    for (Transition& t : rollout.transitions) t.v(0) = t.next_v(0) = 0;
+  }
+  const Findings f = Of({log});
+  INFO(Words(f));
+  CHECK_THAT(Words(f), Catch::Contains("nothing is learnt from what never changed") &&
+                           Catch::Contains("v/" + robot.joints[0].name));
+  std::vector<Rollout> all(1), none;
+  all[0].transitions.assign(3, log.rollouts[0].transitions[0]);
+  for (Transition& t : all[0].transitions) t.next_q = t.q;
+  CHECK(ForgetStill(robot, &all).empty());  // of nothing that moves nothing is forgotten
+  CHECK(ForgetStill(robot, &none).empty());
 }
 
 TEST_CASE("two readings of hundreds that are nonsense raise no alarm") {

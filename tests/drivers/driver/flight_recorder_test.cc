@@ -70,7 +70,7 @@ TEST_CASE("without a folder nothing is recorded, and one that cannot be is an er
   const TemporaryFolder folder;
   std::ofstream(folder.path() / "file") << "x";
   CHECK_THROWS_WITH(FlightRecorder(folder.path() / "file" / "below", {.url = "can0"}, 100, {}),
-                    Catch::EndsWith("/file/below: cannot be written: Not a directory"));
+                    Catch::EndsWith("/file/below: cannot be made: Not a directory"));
   std::string error;
   {
     FlightRecorder gone(folder.path() / "gone", {.url = "can0"}, 100,

@@ -121,6 +121,21 @@ TEST_CASE("a restart: silence, IDLE, and another position") {
                                  Contains("home the joint"));
 }
 
+TEST_CASE("a restart after ten minutes, whatever noise its velocity had") {
+  Bench bench;
+  bench.sample.velocity = 0.1;  // [rad/s]
+  bench.Run(100);
+  bench.powered = false;
+  bench.Run(300);
+  bench.now += 600'000'000;
+  bench.drive.Reboot(bench.now);
+  bench.sample = {-16, 0};
+  bench.powered = true;
+  bench.Run(50);
+  CHECK(bench.motor->lost_place());
+  CHECK_THAT(bench.Reason(), Contains("has restarted"));
+}
+
 TEST_CASE("what is no restart") {
   Bench bench;
   bench.Run(100);

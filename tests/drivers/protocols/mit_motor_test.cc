@@ -147,6 +147,30 @@ TEST_CASE("a restart, seen by its position, is a fault") {
   CHECK_FALSE(bench.device.armed());
 }
 
+TEST_CASE("turns survive a silence only where the motor has not moved meanwhile") {
+  Bench bench;
+  bench.sample.velocity = 40;
+  bench.Run(500);  // beyond what a reply can say
+  bench.sample.velocity = 0;
+  bench.Run(10);
+  const double before = bench.motor->estimate().position;
+  REQUIRE(before > 13);
+  bench.to_device = [](const Frame&) { return false; };
+  bench.Run(300);
+  bench.to_device = nullptr;
+  SECTION("it has not") {
+    bench.Run(60);
+    CHECK(bench.motor->estimate().position == Approx(before).margin(2e-3));
+    CHECK_FALSE(bench.motor->lost_place());
+  }
+  SECTION("it has, or counts from elsewhere") {
+    bench.sample.position -= 0.7;
+    bench.Run(60);
+    CHECK(bench.motor->lost_place());
+    CHECK_THAT(std::string(bench.motor->reason()), Contains("lost its place"));
+  }
+}
+
 TEST_CASE("nothing but finite torques within the range is sent, and the others are counted") {
   Bench bench;
   CHECK(bench.Arm());

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "drivers/protocols/moteus_reports.h"
+#include "drivers/protocols/uptime_watch.h"
 #include "tests/drivers/protocols/moteus_motor_bench.h"
 
 namespace plumb {
@@ -152,6 +153,18 @@ TEST_CASE("a counter of milliseconds that goes round after 50 days is no restart
   CHECK_FALSE(answer(0x54 + 600, 2'700'000));  // it waited for us
   CHECK(answer(100, 9'700'000));
   CHECK_FALSE(answer(200, 9'800'000));
+}
+
+TEST_CASE("a drive that had been up for a month has restarted where it says a second") {
+  UptimeWatch watch(1'000'000);
+  const uint32_t month = 30u * 24 * 3600 * 1000;
+  watch.OnUptime(month, 1'000'000);
+  watch.OnUptime(month + 100, 1'100'000);
+  // we had been asleep: it has been up for longer than that
+  watch.OnUptime(month + 3'600'000, 1'200'000);
+  CHECK_FALSE(watch.TakeRestart());
+  watch.OnUptime(1000, 4'200'000);
+  CHECK(watch.TakeRestart() == 1000u);
 }
 
 TEST_CASE("lost frames do not spoil the arming of a moteus") {
