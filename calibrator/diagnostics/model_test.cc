@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "calibrator/diagnostics/candidates.h"
@@ -217,6 +218,17 @@ ModelTest TestModel(const TestedFit& fit, ExecutionOptions execution, int64_t* s
   ModelTest tested = test.Run();
   *simulated_steps += test.simulated_steps();
   return tested;
+}
+
+// The fit's errors are divided by a scale that was estimated of them: that is undone.
+double MeanSquaredError(const OneStepView& view) {
+  if (!view.noise_known) return std::numeric_limits<double>::quiet_NaN();
+  double squares = 0;
+  for (Eigen::Index i = 0; i < view.fit.errors.size(); ++i) {
+    const int coordinate = view.rows[static_cast<size_t>(i)].coordinate;
+    squares += std::pow(view.fit.errors(i) * view.fit.scale(coordinate), 2);
+  }
+  return squares / static_cast<double>(view.fit.errors.size());
 }
 
 OneStepView ViewOneStep(const MethodInput& input, const MethodResult& result) {

@@ -63,6 +63,10 @@ struct OneStepView {
   int64_t simulated_steps = 0;
 };
 
+/// Mean of the squared errors, whitened by the noise as it was recorded: 1 = down to the noise; NaN
+/// where nobody knows it. Thread-safe.
+double MeanSquaredError(const OneStepView& view);
+
 /// @throws std::invalid_argument as FitLaplace.
 OneStepView ViewOneStep(const MethodInput& input, const MethodResult& result);
 

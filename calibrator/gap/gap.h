@@ -43,8 +43,8 @@ struct Gap {
 struct GapFit {
   MethodResult result;     ///< informed by the transitions that the model explains
   Misspecification alarm;  ///< of the model alone, with the posterior of all transitions
-  /// the model was asked (alarm.judged), and explains the transitions but for what is too little to
-  /// matter: there is neither an obstacle to a residual that it may need, nor a residual
+  /// the model was asked (alarm.judged), and explains the transitions: no alarm, or one of what is
+  /// too little to be learnt, with errors that are hardly larger than the readings' noise
   bool explained = false;
   OneStepView view;             ///< that the alarm is of
   Eigen::MatrixXd information;  ///< that the result rests on, as OneStepView's

@@ -5,7 +5,6 @@
 
 #include <chrono>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "calibrator/design/excitation.h"
@@ -109,17 +108,6 @@ class Calibration {
     findings_.discrepancy = MeanSquaredError(view);
     findings_.errors = view.fit.errors;
     findings_.rows = view.rows;
-  }
-
-  // The fit's errors are divided by a scale that was estimated of them: that is undone.
-  static double MeanSquaredError(const OneStepView& view) {
-    if (!view.noise_known) return std::numeric_limits<double>::quiet_NaN();
-    double squares = 0;
-    for (Eigen::Index i = 0; i < view.fit.errors.size(); ++i) {
-      const int coordinate = view.rows[static_cast<size_t>(i)].coordinate;
-      squares += std::pow(view.fit.errors(i) * view.fit.scale(coordinate), 2);
-    }
-    return squares / static_cast<double>(view.fit.errors.size());
   }
 
   void FindWhatIsKnown(const GapFit& fit) {

@@ -113,14 +113,17 @@ void Driver::RequestArm(int64_t made, bool homed) noexcept {
     } else if (!joint.measured || now - joint.measured_at > stale_after_) {
       why.Set("{}: no encoder estimates", joint.name);
     } else if (joint.watch.crowded()) {
-      why.Set("{}: more encoder estimates than one drive is to send: two drives with one id?",
-              joint.name);
+      why.Set(
+          "{}: more encoder estimates than one drive is to send: does it send them more often than "
+          "[driver] measurement says, or have two drives one id?",
+          joint.name);
     } else if (Reason bad; !WithinOperatingLimits(joint.motor->readings(), settings_, bad)) {
       why.Set("{}: {}", joint.name, bad.text());
     }
-    if (joint.motor->lost_place() && !homed)
-      why.Set("{}: its drive has lost its place: home the joint, then plumb arm --homed",
-              joint.name);
+    if (!homed && (joint.motor->lost_place() || joint.watch.lost_place()))
+      why.Set(
+          "{}: {}: home the joint, then plumb arm --homed", joint.name,
+          joint.motor->lost_place() ? "its drive has lost its place" : "its position has jumped");
     if (!why.text().empty()) return Refuse(why.text());
   }
   for (JointSensor& sensor : sensors_) {
@@ -143,7 +146,7 @@ void Driver::RequestArm(int64_t made, bool homed) noexcept {
   forgery_ = {};
   cause_.Clear();
   for (Joint& joint : joints_) {
-    if (homed) joint.motor->Homed();
+    if (homed) joint.motor->Homed(), joint.watch.Homed();
     joint.motor->Arm(now);
     joint.watch.ClearComplaint();
     joint.commanded = 0;

@@ -85,6 +85,7 @@ bool Plausibility::Jumped(const Estimate& next) noexcept {
   const double most = settings_.velocity_limit * (seconds + Seconds(settings_.period)) +
                       before * Seconds(settings_.lateness) + Slack(next.position);
   if (!(std::abs(jump) > most)) return false;
+  jumped_ = true;
   Complain(
       "the position jumped by {:.3g} in {:.3g} ms, at a velocity limit of {:.3g} it can do {:.3g}",
       jump, seconds * 1e3, settings_.velocity_limit, most);

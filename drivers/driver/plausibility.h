@@ -58,12 +58,16 @@ class Plausibility {
 
   /// The joint may have been put elsewhere at once: all but the number of devices is judged anew
   /// from the next estimate on.
-  void Displaced() noexcept { seen_ = false; }
+  void Displaced() noexcept { seen_ = jumped_ = false; }
 
   /// The first thing that was implausible; empty if nothing was.
   std::string_view complaint() const noexcept { return complaint_.text(); }
   /// Takes the complaint back. What is wrong still will be found again.
   void ClearComplaint() noexcept { complaint_.Clear(); }
+  /// Its position has jumped: what it counts from may be elsewhere by as much, until somebody has
+  /// homed the joint.
+  bool lost_place() const noexcept { return jumped_; }
+  void Homed() noexcept { jumped_ = false; }
   /// Whether more than one device seems to send estimates; so until 100 T have gone by with no more
   /// than one would.
   bool crowded() const noexcept { return crowded_; }
@@ -97,6 +101,7 @@ class Plausibility {
   PlausibilitySettings settings_;
   Reason complaint_;
   bool seen_ = false;
+  bool jumped_ = false;
   Estimate last_;
   Comparison comparison_;
   int64_t unchanged_ = 0;  // [us] under an effort

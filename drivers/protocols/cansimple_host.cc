@@ -39,11 +39,16 @@ class CanSimpleMotor : public Motor {
       Fail(now, "two drives have its node id");
     if (const auto restart = reports_.TakeRestart()) {
       lost_place_ = true;
-      Fail(now,
-           "the drive has restarted (silent for {} ms, then its position jumped by {:.3g} turns): "
-           "home the "
-           "joint anew",
-           restart->silence / 1000, restart->jump);
+      if (restart->jump == 0)
+        Fail(now,
+             "the drive may have restarted (silent for {} ms, then at zero): home the joint anew",
+             restart->silence / 1000);
+      else
+        Fail(
+            now,
+            "the drive has restarted (silent for {} ms, then its position jumped by {:.3g} turns): "
+            "home the joint anew",
+            restart->silence / 1000, restart->jump);
     }
     return use;
   }
@@ -260,8 +265,11 @@ class CanSimpleMotor : public Motor {
     if (step_ == Step::kAwait && running) Enter(Step::kArmed, now);
     // The state counts, not only the error: drives have been seen to fall to IDLE with error 0.
     if (step_ == Step::kArmed && !running) {
-      Fail(now, "the drive went to {}: {} ({})", DescribeAxisState(axis_state_), Words(axis_error_),
-           DescribeProcedureResult(procedure_result_));
+      if (axis_state_ == kClosedLoopControl)
+        Fail(now, "the drive reports: {}", Words(axis_error_));
+      else
+        Fail(now, "the drive went to {}: {} ({})", DescribeAxisState(axis_state_),
+             Words(axis_error_), DescribeProcedureResult(procedure_result_));
       ask_error_ = true;
     }
     return FrameUse::kConsumed;

@@ -19,6 +19,7 @@ constexpr int64_t kTogether = 1'000'000;  // [us] between silence and jump of on
 constexpr double kLeastJump = 0.05;       // [turns] beyond what the velocities explain
 // [s] that velocities explain: where a joint has been in a longer silence they do not tell
 constexpr double kExplained = 0.25;
+constexpr int64_t kPowerCut = 500'000;  // [us] that a drive takes to start again, at least
 
 const Layout* Find(uint32_t command) {
   switch (command) {
@@ -93,6 +94,7 @@ FrameUse CanSimpleReports::OnAddress(const FieldValues& v) noexcept {
 FrameUse CanSimpleReports::OnEstimates(const FieldValues& v, int64_t now) noexcept {
   const MotorEstimate next{v[0] * kRadiansPerTurn, v[1] * kRadiansPerTurn};
   if (estimated_) {
+    if (now - estimated_at_ > kPowerCut) away_until_ = now;
     const double seconds = std::min(kExplained, Seconds(now - estimated_at_));
     const double turned = std::abs(next.position - estimate_.position) / kRadiansPerTurn;
     const double fastest =
@@ -106,6 +108,7 @@ FrameUse CanSimpleReports::OnEstimates(const FieldValues& v, int64_t now) noexce
   estimated_ = true;
   estimated_at_ = now;
   estimate_ = next;
+  LookForRestart();
   return FrameUse::kEstimate;
 }
 
@@ -125,9 +128,17 @@ void CanSimpleReports::OnHeartbeat(int axis_state, int64_t now) noexcept {
 }
 
 void CanSimpleReports::LookForRestart() noexcept {
-  if (!silence_.seen || !jump_.seen || std::abs(silence_.at - jump_.at) > kTogether) return;
-  restart_ = Restart{static_cast<int64_t>(silence_.size), jump_.size};
+  if (!silence_.seen) return;
+  const bool jumped = jump_.seen && std::abs(silence_.at - jump_.at) <= kTogether;
+  // A drive whose encoder begins to count at zero says so wherever the joint is, and no jump tells
+  // of it where it had been near its zero before.
+  const bool zero = silence_.size > kPowerCut && away_until_ != 0 &&
+                    std::abs(silence_.at - away_until_) <= kTogether &&
+                    std::abs(estimate_.position) < kLeastJump * kRadiansPerTurn;
+  if (!jumped && !zero) return;
+  restart_ = Restart{static_cast<int64_t>(silence_.size), jumped ? jump_.size : 0};
   silence_.seen = jump_.seen = false;
+  away_until_ = 0;
 }
 
 std::optional<CanSimpleReports::Restart> CanSimpleReports::TakeRestart() noexcept {

@@ -35,14 +35,19 @@ class CanSimpleReports {
   bool two_drives() const noexcept { return two_drives_; }
 
   /// See Motor::Displaced.
-  void Displaced() noexcept { estimated_ = false; }
+  void Displaced() noexcept {
+    estimated_ = false;
+    away_until_ = 0;
+  }
 
   struct Restart {
     int64_t silence;  ///< [us] between two heartbeats
-    double jump;      ///< [turns] of the position
+    double jump;      ///< [turns] of the position; 0 = none was seen, but it is zero now
   };
   /// Heartbeats stayed away, then said IDLE, and about that time the position jumped farther than
-  /// it can have turned: the drive lost its power, and with it its place. Told once.
+  /// it can have turned, or estimates stayed away, too, for as long as a drive takes to start, and
+  /// the position is zero, as after a start: the drive lost its power, and with it its place. Told
+  /// once.
   std::optional<Restart> TakeRestart() noexcept;
 
  private:
@@ -68,6 +73,7 @@ class CanSimpleReports {
     bool seen = false;
   };
   Event silence_, jump_;
+  int64_t away_until_ = 0;  // the first estimate after a long silence; 0 = none
   std::optional<Restart> restart_;
 };
 

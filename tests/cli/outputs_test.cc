@@ -82,7 +82,7 @@ TEST_CASE("launch: a folder that cannot be made is told as every file is") {
   INFO(outcome.text);
   CHECK(outcome.status == 1);
   CHECK_THAT(outcome.text,
-             Catch::Contains("/proc/xx: cannot be written: ") && !Catch::Contains("filesystem"));
+             Catch::Contains("/proc/xx: cannot be made: ") && !Catch::Contains("filesystem"));
 }
 
 TEST_CASE("a recording that cannot be made again is not written over unasked") {

@@ -19,7 +19,12 @@ TEST_CASE("fault 1: a drive falls silent", "[fault]") {
               .happens = [](BusRig& rig) { rig.silent = FromKnee; },
               .is_over = [](BusRig& rig) { rig.silent = BusRig::Nothing; },
               .reason = "knee1: no encoder estimate for 5",
-              .within = 60});
+              .within = 60,
+              // elsewhere than at its zero, where it would be taken to have lost its power
+              .prepare =
+                  [](BusRig& rig) {
+                    rig.each_millisecond.push_back([&rig] { rig.samples[1].position = 0.3; });
+                  }});
 }
 
 TEST_CASE("fault 2: a drive goes idle and reports no error", "[fault]") {
@@ -196,7 +201,16 @@ TEST_CASE("fault 13: an encoder jumps", "[fault]") {
               .name = "an encoder jumps by half a radian",
               .detection = "farther than the velocity limit lets the joint go",
               .happens = [](BusRig& rig) { rig.samples[1].position += 0.5 / (2 * std::acos(-1.)); },
+              .is_over =
+                  [](BusRig& rig) {
+                    CHECK_FALSE(rig.Arm(1));
+                    CHECK_THAT(rig.Reason(),
+                               Contains("ARM refused: knee1: its position has jumped: home the "
+                                        "joint, then plumb arm --homed"));
+                    rig.commanding = false;
+                  },
               .reason = "knee1: the position jumped by 0.5 in 5 ms",
+              .arm = driver_request_t::ARM_HOMED,
               .within = 5});
 }
 

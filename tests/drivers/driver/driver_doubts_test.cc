@@ -34,6 +34,7 @@ TEST_CASE("an encoder that cannot be right stops the robot") {
   rig.robot.driver.stuck_after = 0.5;
   double velocity = 3;  // [rad/s] of the pivot
   bool turning = true;
+  int8_t arm = driver_request_t::ARM;
   rig.on_step = [&] {
     if (turning) rig.samples[0].position += velocity / kTurn * 1e-3;
     rig.samples[0].velocity = velocity / kTurn;
@@ -44,10 +45,12 @@ TEST_CASE("an encoder that cannot be right stops the robot") {
   rig.Run(1000);
   REQUIRE(rig.driver->state() == DriveState::kArmed);
   SECTION("jump") {
+    arm = driver_request_t::ARM_HOMED;
     rig.samples[0].position += 1 / kTurn;
     CheckStops(rig, 5, "pivot: the position jumped by 1.0");
   }
   SECTION("jump of the other joint") {
+    arm = driver_request_t::ARM_HOMED;
     rig.samples[1].position -= 1 / kTurn;
     CheckStops(rig, 5, "knee1: the position jumped by -1 in 5 ms, at a velocity limit of 20");
   }
@@ -84,7 +87,8 @@ TEST_CASE("an encoder that cannot be right stops the robot") {
   velocity = 3;
   turning = true;
   rig.Run(100);
-  REQUIRE(rig.Arm(1));
+  CHECK(rig.Arm(1) == (arm == driver_request_t::ARM));
+  REQUIRE(rig.Arm(1, arm));
   rig.Run(400);
   CHECK(rig.driver->state() == DriveState::kArmed);
   CHECK(rig.drives[0].Torque() == 1);

@@ -51,7 +51,7 @@ TEST_CASE("a drive that stops working stops the robot, with the reason") {
   }
   SECTION("an error while in closed loop") {
     rig.Inject("041#0004000008000000");
-    expected = "knee1: the drive went to CLOSED_LOOP_CONTROL: DC bus over-current (success)";
+    expected = "knee1: the drive reports: DC bus over-current";
     at_most = 5;
   }
   SECTION("no encoder estimates") {

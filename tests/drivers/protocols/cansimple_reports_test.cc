@@ -136,6 +136,20 @@ TEST_CASE("a restart after ten minutes, whatever noise its velocity had") {
   CHECK_THAT(bench.Reason(), Contains("has restarted"));
 }
 
+TEST_CASE("a restart that no jump tells of: it says zero, as it did before") {
+  Bench bench;
+  bench.sample = {0.004, 0};
+  bench.Run(100);
+  bench.powered = false;
+  const bool cut = GENERATE(true, false);
+  bench.Run(cut ? 1500 : 300);
+  bench.drive.Reboot(bench.now);
+  bench.powered = true;
+  bench.Run(50);
+  CHECK(bench.motor->lost_place() == cut);
+  if (cut) CHECK_THAT(bench.Reason(), Contains("may have restarted"));
+}
+
 TEST_CASE("what is no restart") {
   Bench bench;
   bench.Run(100);
