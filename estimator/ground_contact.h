@@ -13,9 +13,9 @@ namespace plumb {
 
 /// Judges the hypothesis that a point rests on the ground by residuals that should then be zero:
 /// its height, its vertical velocity and, where a base is told by its legs, the speed at which it
-/// slides along the ground, each over its standard deviation. No forces, hence
-/// no masses, but in the height of a base that stands on soft ground (LegOdometry::Settings::give):
-/// what calibration learns from it is not what it put in. Not thread-safe.
+/// slides along the ground, each over its standard deviation. No forces, hence no masses, but in
+/// the height of a base that stands on soft ground (LegOdometry::Settings::give): what calibration
+/// learns from it is not what it put in. Not thread-safe.
 class ContactTest {
  public:
   /// Uncertainty of the ground rather than of the robot: it is not quite even, and gives way.

@@ -133,6 +133,7 @@ class LegOdometry {
   static Eigen::Index IndexOf(size_t foot) { return kFeet + 3 * static_cast<Eigen::Index>(foot); }
 
   double Sd(Eigen::Index block, const Eigen::Vector3d& direction) const;
+  Eigen::Vector3d RollingOf(const Foot& foot) const;
   ContactTest::Motion MotionOf(const Foot& foot) const;
   void Judge(size_t index, std::span<const Foot> feet);
   void CompareWithLowest(const Foot& foot, std::span<const Foot> feet,
