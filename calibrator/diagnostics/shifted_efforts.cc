@@ -15,6 +15,21 @@ namespace plumb {
 namespace {
 
 constexpr size_t kMostSteps = 500, kFewestSteps = 20;
+// Share of what a velocity changes by in a step, root mean square.
+constexpr double kMuch = 0.1;
+
+// Efforts of another row make errors as large as what efforts do.
+bool MayBeShifted(std::span<const Rollout> rollouts, const Eigen::ArrayXd& velocity_noise) {
+  Eigen::ArrayXd squares = Eigen::ArrayXd::Zero(velocity_noise.size()), count = squares;
+  for (const Rollout& rollout : rollouts) {
+    for (const Transition& t : rollout.transitions) {
+      const Eigen::ArrayXd change = (t.next_v - t.v).array().square();
+      squares += change.isFinite().select(change, 0);
+      count += change.isFinite().cast<double>();
+    }
+  }
+  return (velocity_noise.square() > kMuch * kMuch * squares / count.max(1)).any();
+}
 
 // Those that have both neighbours, each with the efforts of the step so many rows after.
 std::vector<Rollout> WithEffortsOf(std::span<const Rollout> rollouts, int rows) {
@@ -55,10 +70,11 @@ std::optional<Eigen::ArrayXd> Variances(const std::shared_ptr<const Model>& mode
 }  // namespace
 
 EffortShift FindEffortShift(const std::shared_ptr<const Model>& model,
-                            std::span<const Rollout> rollouts, ExecutionOptions execution,
-                            int64_t* simulated_steps) {
-  const std::vector<Rollout> own = WithEffortsOf(rollouts, 0);
+                            std::span<const Rollout> rollouts, const Eigen::VectorXd& noise_sd,
+                            ExecutionOptions execution, int64_t* simulated_steps) {
   EffortShift found;
+  if (!MayBeShifted(rollouts, noise_sd.tail(model->description().num_velocities()))) return found;
+  const std::vector<Rollout> own = WithEffortsOf(rollouts, 0);
   if (CountTransitions(own) < kFewestSteps) return found;
   const auto as_recorded = Variances(model, own, execution, simulated_steps);
   if (!as_recorded) return found;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -21,14 +22,16 @@ struct EffortShift {
 /// efforts are late by a row a fit makes of what is left of them whatever explains it best: masses
 /// that are many of the prior's standard deviations away, and errors that look like noise.
 ///
-/// Fits single steps three times, with the same steps and each row's efforts, the one before's and
+/// Looks only where errors of a velocity are a tenth of what it changes by in a step or more. Then
+/// fits single steps three times, with the same steps and each row's efforts, the one before's and
 /// the one after's: 500 transitions at most that have both. Threads as `execution` says.
 /// Thread-safe.
+/// @param noise_sd of each entry of (q, v), as the errors of one step have it
 /// @return rows = 0 unless less than kClearlyShifted is left, and where too few transitions have
 /// both neighbours, or a fit fails.
 EffortShift FindEffortShift(const std::shared_ptr<const Model>& model,
-                            std::span<const Rollout> rollouts, ExecutionOptions execution,
-                            int64_t* simulated_steps);
+                            std::span<const Rollout> rollouts, const Eigen::VectorXd& noise_sd,
+                            ExecutionOptions execution, int64_t* simulated_steps);
 
 /// What that means, and what to do about it: a sentence. Empty without a shift.
 std::string DescribeShift(const EffortShift& shift);

@@ -124,58 +124,6 @@ void ForgetVelocities(const RobotDescription& robot, std::span<const std::string
   }
 }
 
-std::vector<std::string> ForgetStill(const RobotDescription& robot,
-                                     std::vector<Rollout>* rollouts) {
-  using Entries = Eigen::VectorXd Transition::*;
-  const Transition* first = nullptr;
-  for (const Rollout& rollout : *rollouts)
-    if (!first && !rollout.transitions.empty()) first = &rollout.transitions[0];
-  if (!first) return {};
-  const auto still = [&](Entries begin, Entries end, Entries end_sd, Eigen::Index at,
-                         Eigen::Index size, Eigen::Index sd_at, Eigen::Index sd_size) {
-    const Eigen::VectorXd value = (first->*begin).segment(at, size);
-    return std::ranges::all_of(*rollouts, [&](const Rollout& rollout) {
-      return std::ranges::all_of(rollout.transitions, [&](const Transition& t) {
-        return (t.*begin).segment(at, size) == value && (t.*end).segment(at, size) == value &&
-               (t.*end_sd).segment(sd_at, sd_size).array().isNaN().all();
-      });
-    });
-  };
-  struct Still {
-    Entries end;
-    Eigen::Index at, size;
-  };
-  std::vector<Still> forgotten;
-  std::vector<std::string> names, unread;
-  bool any_moves = false;
-  for (int i = 0; i < robot.num_joints(); ++i) {
-    const JointDescription& joint = robot.joints[static_cast<size_t>(i)];
-    const Eigen::Index q = robot.position_of(i), v = robot.velocity_of(i),
-                       nq = joint.num_positions(), nv = joint.num_velocities();
-    const bool q_still =
-        still(&Transition::q, &Transition::next_q, &Transition::next_q_sd, q, nq, v, nv);
-    const bool v_still =
-        still(&Transition::v, &Transition::next_v, &Transition::next_v_sd, v, nv, v, nv);
-    any_moves = any_moves || !q_still || !v_still;
-    if (q_still)
-      forgotten.push_back({&Transition::next_q, q, nq}), names.push_back("q/" + joint.name);
-    if (!v_still) continue;
-    names.push_back("v/" + joint.name);
-    if (q_still)
-      forgotten.push_back({&Transition::next_v, v, nv});
-    else
-      unread.push_back(joint.name);  // it does not begin with that velocity, either
-  }
-  if (!any_moves) return {};
-  ForgetVelocities(robot, unread, rollouts);
-  for (Rollout& rollout : *rollouts) {
-    for (Transition& t : rollout.transitions) {
-      for (const Still& s : forgotten) (t.*s.end).segment(s.at, s.size).setConstant(kNaN);
-    }
-  }
-  return names;
-}
-
 void DifferencePositions(const ConfigurationSpace& space, double period,
                          std::vector<MotionRow>* rows) {
   const auto follows = [&](size_t k) {  // row k + 1 row k

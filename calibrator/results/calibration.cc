@@ -17,6 +17,7 @@
 #include "calibrator/fit/recorded_window.h"
 #include "calibrator/gap/gap.h"
 #include "calibrator/motion/differences.h"
+#include "calibrator/motion/still_readings.h"
 #include "calibrator/results/summary.h"
 #include "common/time_units.h"
 #include "robot/parameter_distribution.h"
@@ -31,9 +32,6 @@ constexpr char kCure[] =
 
 // Times the error without it; less may be chance.
 constexpr double kHarm = 1.1;
-
-// Share of what a velocity changes by in a step, root mean square.
-constexpr double kMuch = 0.1;
 
 class Calibration {
  public:
@@ -209,26 +207,13 @@ class Calibration {
     if (!too_long.empty()) findings_.warnings.push_back(too_long);
   }
 
-  // A driver's log says when efforts acted. A table may have them in another row; where that makes
-  // errors they are as large as what efforts do.
+  // A driver's log says when efforts acted. A table may have them in another row.
   void JudgeRows(const OneStepView& view) {
     if (!KnowsLikelihood(options_.method) || view.noise_known) return;
-    const Eigen::Index n = robot_.num_velocities();
-    Eigen::ArrayXd squares = Eigen::ArrayXd::Zero(n), count = squares;
-    for (const Rollout& rollout : rollouts_) {
-      for (const Transition& t : rollout.transitions) {
-        const Eigen::ArrayXd change = (t.next_v - t.v).array().square();
-        const auto known = change.isFinite();
-        squares += known.select(change, 0);
-        count += known.cast<double>();
-      }
-    }
-    const Eigen::ArrayXd unexplained = view.noise_sd.tail(n).array().square();
-    if (!(unexplained > kMuch * kMuch * squares / count.max(1)).any()) return;
-    findings_.efforts =
-        FindEffortShift(model_, rollouts_, options_.execution, &findings_.diagnostic_steps);
-    if (findings_.efforts.rows == 0) return;
-    findings_.warnings.insert(findings_.warnings.begin(), DescribeShift(findings_.efforts));
+    findings_.efforts = FindEffortShift(model_, rollouts_, view.noise_sd, options_.execution,
+                                        &findings_.diagnostic_steps);
+    if (findings_.efforts.rows != 0)
+      findings_.warnings.insert(findings_.warnings.begin(), DescribeShift(findings_.efforts));
   }
 
   // Each log on its own: are they of the same robot?

@@ -1,6 +1,7 @@
 #include "calibrator/fit/methods.h"
 
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <limits>
@@ -45,6 +46,26 @@ TEST_CASE("a budget beyond 32 bits is one") {
         if (share > 0 && share < 1) throw Searching();
       };
       CHECK_THROWS_AS(RunMethod({model, log, options}), Searching);
+    }
+  }
+}
+
+TEST_CASE("a distance of errors is not led to a zero that no simulator has") {
+  const RobotDescription robot = Robot("pendulum");
+  const auto model = std::make_shared<Model>(robot);
+  const std::vector<Rollout> log = RandomLog(robot, {{}, 1e-3, 5e-3}, 300, 3);
+  const Eigen::VectorXd truth = HiddenParameters(robot, 3);
+  for (const char* discrepancy : {"squared", "energy"}) {
+    CalibrationOptions options;
+    options.method = "abc-rejection", options.discrepancy = discrepancy;
+    options.budget = 1'000'000;
+    const Gaussian posterior = Moments(RunMethod({model, log, options}).posterior);
+    for (Eigen::Index i = 0; i < truth.size(); ++i) {
+      const ParameterDescription& p = robot.parameters[static_cast<size_t>(i)];
+      const double off = posterior.mean(i) - p.ToCoordinate(truth(i)),
+                   sd = std::sqrt(posterior.covariance(i, i));
+      CAPTURE(discrepancy, p.name, posterior.mean(i), off, sd);
+      CHECK(std::abs(off) < 2 * sd);
     }
   }
 }

@@ -2,7 +2,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "calibrator/motion/differences.h"
+#include "calibrator/motion/still_readings.h"
 #include "calibrator/results/summary.h"
 #include "sim/simulator.h"
 #include "tests/calibrator/results/swinging.h"
