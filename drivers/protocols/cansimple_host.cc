@@ -39,16 +39,17 @@ class CanSimpleMotor : public Motor {
       Fail(now, "two drives have its node id");
     if (const auto restart = reports_.TakeRestart()) {
       lost_place_ = true;
-      if (restart->jump == 0)
-        Fail(now,
-             "the drive may have restarted (silent for {} ms, then at zero): home the joint anew",
-             restart->silence / 1000);
-      else
+      const int64_t silent = restart->silence / 1000;
+      if (restart->jump)
         Fail(
             now,
             "the drive has restarted (silent for {} ms, then its position jumped by {:.3g} turns): "
             "home the joint anew",
-            restart->silence / 1000, restart->jump);
+            silent, *restart->jump);
+      else
+        Fail(now,
+             "the drive may have restarted (silent for {} ms, then at zero): home the joint anew",
+             silent);
     }
     return use;
   }

@@ -94,8 +94,9 @@ FrameUse CanSimpleReports::OnAddress(const FieldValues& v) noexcept {
 FrameUse CanSimpleReports::OnEstimates(const FieldValues& v, int64_t now) noexcept {
   const MotorEstimate next{v[0] * kRadiansPerTurn, v[1] * kRadiansPerTurn};
   if (estimated_) {
-    if (now - estimated_at_ > kPowerCut) away_until_ = now;
-    const double seconds = std::min(kExplained, Seconds(now - estimated_at_));
+    const int64_t gap = now - estimated_at_;
+    if (gap > kPowerCut) away_ = {now, static_cast<double>(gap), true};
+    const double seconds = std::min(kExplained, Seconds(gap));
     const double turned = std::abs(next.position - estimate_.position) / kRadiansPerTurn;
     const double fastest =
         std::max(std::abs(next.velocity), std::abs(estimate_.velocity)) / kRadiansPerTurn;
@@ -128,17 +129,18 @@ void CanSimpleReports::OnHeartbeat(int axis_state, int64_t now) noexcept {
 }
 
 void CanSimpleReports::LookForRestart() noexcept {
-  if (!silence_.seen) return;
-  const bool jumped = jump_.seen && std::abs(silence_.at - jump_.at) <= kTogether;
+  const auto with_silence = [this](const Event& event) {
+    return silence_.seen && event.seen && std::abs(silence_.at - event.at) <= kTogether;
+  };
+  const bool jumped = with_silence(jump_);
   // A drive whose encoder begins to count at zero says so wherever the joint is, and no jump tells
   // of it where it had been near its zero before.
-  const bool zero = silence_.size > kPowerCut && away_until_ != 0 &&
-                    std::abs(silence_.at - away_until_) <= kTogether &&
+  const bool zero = with_silence(away_) && silence_.size > kPowerCut &&
                     std::abs(estimate_.position) < kLeastJump * kRadiansPerTurn;
   if (!jumped && !zero) return;
-  restart_ = Restart{static_cast<int64_t>(silence_.size), jumped ? jump_.size : 0};
-  silence_.seen = jump_.seen = false;
-  away_until_ = 0;
+  restart_ = Restart{static_cast<int64_t>(silence_.size),
+                     jumped ? std::optional(jump_.size) : std::nullopt};
+  silence_.seen = away_.seen = jump_.seen = false;
 }
 
 std::optional<CanSimpleReports::Restart> CanSimpleReports::TakeRestart() noexcept {

@@ -35,14 +35,12 @@ class CanSimpleReports {
   bool two_drives() const noexcept { return two_drives_; }
 
   /// See Motor::Displaced.
-  void Displaced() noexcept {
-    estimated_ = false;
-    away_until_ = 0;
-  }
+  void Displaced() noexcept { estimated_ = away_.seen = false; }
 
   struct Restart {
     int64_t silence;  ///< [us] between two heartbeats
-    double jump;      ///< [turns] of the position; 0 = none was seen, but it is zero now
+    /// [turns] of the position; nothing = it is zero, as it was before
+    std::optional<double> jump;
   };
   /// Heartbeats stayed away, then said IDLE, and about that time the position jumped farther than
   /// it can have turned, or estimates stayed away, too, for as long as a drive takes to start, and
@@ -72,8 +70,8 @@ class CanSimpleReports {
     double size = 0;
     bool seen = false;
   };
-  Event silence_, jump_;
-  int64_t away_until_ = 0;  // the first estimate after a long silence; 0 = none
+  // heartbeats that stayed away, estimates that did, and a jump of the position
+  Event silence_, away_, jump_;
   std::optional<Restart> restart_;
 };
 

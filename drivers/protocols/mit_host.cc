@@ -17,7 +17,7 @@ constexpr int kZeroFrames = 3;  // frames of zero gains before "enter"
 constexpr int kEnters = 2;      // one of them may be lost on the bus
 constexpr int kRepliesToArm = 2;
 constexpr double kUneven = 0.01;  // [s] by which replies may come early or late
-constexpr double kUnmoved = 0.1;  // [rad]
+constexpr double kUnmoved = 0.1;  // [rad] that a joint may have sagged by in a silence
 
 enum class Step { kRest, kZeros, kEnter, kAwait, kArmed, kDisarming };
 
