@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 #include <memory>
 
+#include "common/atomic_file.h"
 #include "tests/temporary_folder.h"
 #include "tests/trainer/pendulum_session.h"
 
@@ -78,6 +79,18 @@ TEST_CASE("a run that begins anew says the same, and computes what nobody has co
     CHECK(third.said[i].steps == straight.said[i].steps);
     CHECK(third.said[i].complete == straight.said[i].complete);
   }
+}
+
+TEST_CASE("a past training that is damaged is trained again") {
+  const TemporaryFolder folder;
+  Life first(folder);
+  first.Begin(0);
+  CHECK(first.Train() == 6);
+  WriteAtomically(folder / "trainer_0.checkpoint", "PLUMBTRN and nothing more");
+  Life second(folder);
+  second.Begin(0);
+  CHECK(second.Train() == 6);
+  CHECK(second.Bytes() == first.Bytes());
 }
 
 TEST_CASE("what was trained of something else is trained again") {

@@ -115,6 +115,10 @@ TEST_CASE("No checkpoint is nothing; one of another run is an error") {
   TrainingSession other_network(robot, MakeGymPendulum, 2, 4, 1);
   CHECK_THROWS_WITH(other_network.Restore(checkpoint), Catch::Contains("another robot or network"));
   robot = PendulumRobot();
+  ++robot.fingerprint;  // another effort limit, say
+  TrainingSession changed_robot(robot, MakeGymPendulum, 2, 4, 1);
+  CHECK_THROWS_WITH(changed_robot.Restore(checkpoint), Catch::Contains("has changed since"));
+  robot = PendulumRobot();
   robot.parameters[0].name = "wind";
   TrainingSession other_robot(robot, MakeGymPendulum, 2, 4, 1);
   CHECK_THROWS_WITH(other_robot.Restore(checkpoint), Catch::Contains("another robot or network"));
