@@ -21,12 +21,12 @@ namespace plumb {
 ///   lambda ~ Gamma(1 + F, S_all / F_all + S),
 /// the conjugate posterior where the prior is the exponential distribution with the mean of all
 /// policies that this robot has tried, its own trials among them (empirical Bayes); zero where none
-/// has fallen. What counts is the expectation
-/// over lambda, in closed form: how unsure lambda is says nothing for or against a challenger that
-/// has been tried as long as the incumbent. Returns of trials scatter, falls apart, by kScatter of
-/// themselves or, where it is more, by what it makes where an episode begins; the mean of n by
-/// 1 / sqrt(n) of that. kScatter is that of 29 trials of four hoppers without a fall, which begin
-/// alike, each against the mean of ten whole episodes (docs/gap.md).
+/// has fallen. What counts is the expectation over lambda, in closed form: how unsure lambda is
+/// says nothing for or against a challenger that has been tried as long as the incumbent.
+/// Returns of trials scatter, falls apart, by kScatter of themselves or, where it is more, by
+/// what it makes where an episode begins; the mean of n by 1 / sqrt(n) of that. kScatter is
+/// that of 29 trials of four hoppers without a fall, which begin alike, each against the mean
+/// of ten whole episodes (docs/gap.md).
 ///
 /// What a trial does not see are falls after it, and from other starts. Simulators that were learnt
 /// since know of them: of too many, but of more where a policy does fall. Challenger and incumbent
