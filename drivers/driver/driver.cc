@@ -103,6 +103,9 @@ bool Driver::DispatchToMotors(size_t bus, const Frame& frame, int64_t now, int64
         continue;
       case FrameUse::kRejected:
         return false;
+      case FrameUse::kNotFinite:
+        joint.not_a_number = true;
+        return false;
       case FrameUse::kConsumed:
         return true;
       case FrameUse::kEstimate: {
@@ -112,6 +115,7 @@ bool Driver::DispatchToMotors(size_t bus, const Frame& frame, int64_t now, int64
                         joint.map.JointEffort(joint.motor->torque_estimate())};
         joint.measured = true;
         joint.measured_at = now;
+        joint.not_a_number = false;
         joint.watch.Add(utime, joint.latest.position, joint.latest.velocity,
                         effort_sent_[joint.index]);
         measurements_.Add(static_cast<int>(i), joint.latest, utime);
@@ -167,6 +171,7 @@ void Driver::Tick(int64_t now, int64_t utime, int64_t lateness) noexcept {
   turn_ = (turn_ + 1) % joints_.size();
   Poll();
   for (JointSensor& sensor : sensors_) sensor.device().Tick(now, buses_[sensor.bus()].frames);
+  LookAtPositions();
   NoteChanges();
 }
 

@@ -15,6 +15,7 @@
 #include "drivers/driver/joint_sensor.h"
 #include "drivers/driver/measurements.h"
 #include "drivers/driver/plausibility.h"
+#include "drivers/driver/position_watch.h"
 #include "drivers/protocols/motor.h"
 #include "plumb/driver_request_t.hpp"
 #include "plumb/driver_status_t.hpp"
@@ -119,8 +120,14 @@ class Driver {
     double damping;  // [Nm s/rad] or [N s/m] of a stop
     bool turns;      // does not slide
     Plausibility watch;
+    PositionWatch position_watch;
     bool measured = false;
-    int64_t measured_at = 0;  // `now` of the last estimate
+    int64_t measured_at = 0;    // `now` of the last estimate
+    bool not_a_number = false;  // what came last in the place of an estimate
+    /// Behind "no encoder estimate": what comes instead.
+    std::string_view WhatComes() const noexcept {
+      return not_a_number ? ": what came last is not a number" : "";
+    }
     JointMeasurement latest;
     size_t bus;
     double effort = 0;      // in the torque frame of this cycle
@@ -186,8 +193,11 @@ class Driver {
   void PrepareMessages();
   void NoteLateness(int64_t lateness) noexcept;
   void NoteChanges() noexcept;
+  void LookAtPositions() noexcept;
   /// Whether an armed drive does not report its temperatures any more.
   bool Unwatched(const Joint& joint) const noexcept;
+  /// What is no fault, but not right either; empty: nothing.
+  Reason Warning(const Joint& joint) const noexcept;
   bool Active() const noexcept { return mode_ == Mode::kArming || mode_ == Mode::kArmed; }
 
   const DriverSettings settings_;
@@ -201,6 +211,7 @@ class Driver {
   /// Which sensor measures a joint without a motor.
   struct Measuring {
     size_t joint, sensor;
+    PositionWatch position_watch;
   };
   std::vector<Measuring> passive_;
   /// An encoder on a joint whose motor measures it, too.

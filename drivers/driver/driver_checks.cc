@@ -19,8 +19,8 @@ void Driver::CheckHealth() noexcept {
       return Fault("{}: {}", joint.name, joint.motor->reason());
     }
     if (now_ - joint.measured_at > stale_after_) {
-      return Fault("{}: no encoder estimate for {} ms", joint.name,
-                   (now_ - joint.measured_at) / 1000);
+      return Fault("{}: no encoder estimate for {} ms{}", joint.name,
+                   (now_ - joint.measured_at) / 1000, joint.WhatComes());
     }
     if (!joint.watch.complaint().empty())
       return Fault("{}: {}", joint.name, joint.watch.complaint());
@@ -59,6 +59,23 @@ void Driver::CheckCommand() noexcept {
 bool Driver::Unwatched(const Joint& joint) const noexcept {
   return mode_ == Mode::kArmed &&
          TelemetryIsStale(joint.motor->readings(), Microseconds(settings_.telemetry), now_);
+}
+
+void Driver::LookAtPositions() noexcept {
+  for (Joint& joint : joints_) {
+    if (joint.measured) joint.position_watch.Look(joint.latest.position);
+  }
+  for (Measuring& passive : passive_)
+    passive.position_watch.Look(sensors_[passive.sensor].newest().position);
+}
+
+Reason Driver::Warning(const Joint& joint) const noexcept {
+  Reason warning = joint.position_watch.Warning();
+  if (Unwatched(joint)) {
+    warning.Set("no temperatures for {} ms: if it gets too hot, nobody will know",
+                (now_ - joint.motor->readings().temperatures_at) / 1000);
+  }
+  return warning;
 }
 
 bool Driver::Agree(const SecondEncoder& second, Reason& why) const noexcept {

@@ -110,7 +110,9 @@ void Driver::NoteChanges() noexcept {
     mix(static_cast<uint64_t>(joint.motor->state()));
     mix(hash(joint.motor->reason()));
     mix(Unwatched(joint));
+    mix(joint.position_watch.beyond());
   }
+  for (const Measuring& passive : passive_) mix(passive.position_watch.beyond());
   for (const JointSensor& sensor : sensors_) {
     mix(static_cast<uint64_t>(sensor.device().state()));
     mix(hash(sensor.device().reason()));
@@ -139,13 +141,8 @@ driver_status_t& Driver::Status(int64_t utime, std::span<const TransportStats> s
     const size_t i = joints_[k].index;
     status_.joint_state[i] = static_cast<int8_t>(motor.state());
     status_.joint_reason[i] = motor.reason();
+    if (motor.reason().empty()) status_.joint_reason[i] = Warning(joints_[k]).text();
     const MotorReadings readings = motor.readings();
-    if (Unwatched(joints_[k])) {
-      Reason unwatched;
-      unwatched.Set("no temperatures for {} ms: if it gets too hot, nobody will know",
-                    (now_ - readings.temperatures_at) / 1000);
-      status_.joint_reason[i] = unwatched.text();
-    }
     status_.motor_temperature[i] = readings.motor_temperature;
     status_.drive_temperature[i] = readings.drive_temperature;
     status_.bus_voltage[i] = readings.bus_voltage;
@@ -162,7 +159,8 @@ driver_status_t& Driver::Status(int64_t utime, std::span<const TransportStats> s
   for (const Measuring& passive : passive_) {
     const bool fresh = sensors_[passive.sensor].fresh(now_);
     status_.joint_state[passive.joint] = fresh ? driver_status_t::IDLE : driver_status_t::ABSENT;
-    status_.joint_reason[passive.joint] = status_.sensor_reason[passive.sensor];
+    status_.joint_reason[passive.joint] =
+        fresh ? passive.position_watch.Warning().text() : status_.sensor_reason[passive.sensor];
   }
   status_.measurements_lost = measurements_.lost();
   for (const JointSensor& sensor : sensors_) status_.measurements_lost += sensor.lost();

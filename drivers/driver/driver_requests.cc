@@ -111,7 +111,7 @@ void Driver::RequestArm(int64_t made, bool homed) noexcept {
     if (joint.motor->state() == DriveState::kAbsent) {
       why.Set("{}: {}", joint.name, joint.motor->reason());
     } else if (!joint.measured || now - joint.measured_at > stale_after_) {
-      why.Set("{}: no encoder estimates", joint.name);
+      why.Set("{}: no encoder estimates{}", joint.name, joint.WhatComes());
     } else if (joint.watch.crowded()) {
       why.Set(
           "{}: more encoder estimates than one drive is to send: does it send them more often than "
@@ -153,6 +153,11 @@ void Driver::RequestArm(int64_t made, bool homed) noexcept {
   }
   mode_ = Mode::kArming;
   reason_.Set("arming");
+  for (const Joint& joint : joints_) {
+    if (!joint.position_watch.beyond()) continue;
+    reason_.Set("arming, although {} is {}", joint.name, joint.position_watch.Warning().text());
+    break;
+  }
 }
 
 // Neither is taken for a sign of a controller: a forger could keep the robot from being armed. Nor

@@ -47,6 +47,7 @@ Driver::Joint::Joint(size_t number, const JointDescription& joint, const DriverS
       damping(joint.limits.damping),
       turns(joint.type != JointDescription::Type::kPrismatic),
       watch(PlausibilityOf(joint, settings)),
+      position_watch(joint),
       bus(joint.motor.bus) {}
 
 Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
@@ -138,7 +139,7 @@ void Driver::FindPassiveSensors(const RobotDescription& robot) {
           "joint '{}' has no motor, and no sensor measures it: give it one with [[sensor]]",
           joint.name));
     }
-    passive_.push_back({i, static_cast<size_t>(sensor - sensors_.begin())});
+    passive_.push_back({i, static_cast<size_t>(sensor - sensors_.begin()), PositionWatch(joint)});
   }
 }
 

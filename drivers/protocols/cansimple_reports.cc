@@ -50,7 +50,11 @@ FrameUse CanSimpleReports::OnFrame(const Frame& frame, int64_t now) noexcept {
   const Layout* layout = Find(frame.id & 0x1F);
   if (!layout) return FrameUse::kRejected;
   const auto values = DecodePayload(*layout, frame);
-  if (!values || !AllFinite(*layout, *values)) return FrameUse::kRejected;
+  if (!values) return FrameUse::kRejected;
+  if (!AllFinite(*layout, *values)) {
+    const bool estimates = layout->command == kGetEncoderEstimates.command;
+    return estimates ? FrameUse::kNotFinite : FrameUse::kRejected;
+  }
   const FieldValues& v = *values;
   switch (layout->command) {
     case kGetVersion.command:

@@ -14,7 +14,7 @@ namespace plumb {
 class CanSimpleReports {
  public:
   /// @param frame of the drive's id, not remote. kRejected for what is too short, not finite or
-  /// unknown.
+  /// unknown, kNotFinite for encoder estimates that are not.
   FrameUse OnFrame(const Frame& frame, int64_t now) noexcept;
   /// Call it with each heartbeat.
   void OnHeartbeat(int axis_state, int64_t now) noexcept;

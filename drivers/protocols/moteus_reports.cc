@@ -47,7 +47,7 @@ FrameUse MoteusReports::OnAnswer(const FieldValues& values, int64_t now) noexcep
   if (!std::isnan(readings_.drive_temperature)) readings_.temperatures_at = now;
   uptime_.OnUptime(static_cast<uint32_t>(static_cast<int64_t>(uptime)), now);
   // Whether it runs one must know of a motor without an encoder, too.
-  if (!std::isfinite(position) || !std::isfinite(velocity)) return FrameUse::kConsumed;
+  if (!std::isfinite(position) || !std::isfinite(velocity)) return FrameUse::kNotFinite;
   estimate_ = {position * kTurn, velocity * kTurn};
   return FrameUse::kEstimate;
 }

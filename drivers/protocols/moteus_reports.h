@@ -14,8 +14,9 @@ namespace plumb {
 /// exceptions and allocation. Not thread-safe.
 class MoteusReports {
  public:
-  /// @param frame from the motor. kEstimate for an answer to kQuestion; kConsumed for one without
-  /// a position, and for another that is known; kRejected for all else, of which nothing is kept.
+  /// @param frame from the motor. kEstimate for an answer to kQuestion; kNotFinite for one without
+  /// a position; kConsumed for another that is known; kRejected for all else, of which nothing is
+  /// kept.
   FrameUse OnFrame(const Frame& frame, int64_t now) noexcept;
 
   /// What was learnt before is forgotten: the next motor of this id may be another.

@@ -37,8 +37,9 @@ struct MotorReadings {
 
 /// A motor's verdict on a frame.
 enum class FrameUse {
-  kNotMine,   ///< another id, or of a kind that this drive does not send: remote, error, FD ...
-  kRejected,  ///< its id, but too short, not finite or of an unknown kind
+  kNotMine,    ///< another id, or of a kind that this drive does not send: remote, error, FD ...
+  kRejected,   ///< its id, but too short, not finite or of an unknown kind
+  kNotFinite,  ///< no MotorEstimate, as what carries one has numbers that are none
   kConsumed,
   kEstimate,  ///< carried a new MotorEstimate
 };

@@ -67,8 +67,9 @@ class Drive : public VirtualDrive {
     const FieldValues values = *DecodePayload(kCommand.layout, frame);
     const auto& [mode, position, velocity, torque, kp, kd, most, timeout, integral, a, b, c] =
         values;
-    Require(mode == kPositionMode && std::isnan(position) && velocity == 0 && kp == 0 && kd == 0 &&
-            integral == 0 && timeout == 100 && std::abs(most - settings_.most_torque) < 1e-6);
+    Require(mode == int{kPositionMode} && std::isnan(position) && velocity == 0 && kp == 0 &&
+            kd == 0 && integral == 0 && timeout == 100 &&
+            std::abs(most - settings_.most_torque) < 1e-6);
     return torque;
   }
   double max_torque() const override { return settings_.most_torque; }

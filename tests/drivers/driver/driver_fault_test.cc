@@ -8,8 +8,17 @@ namespace plumb {
 namespace {
 
 using Catch::Matchers::Contains;
+using Catch::Matchers::EndsWith;
 using Catch::Matchers::Equals;
 using Catch::Matchers::StartsWith;
+
+// Of the encoder estimates of that id the position becomes none.
+auto NotANumber(uint32_t id) {
+  return [id](Frame& frame) {
+    if (frame.id == id) frame.data[3] = 0x7F, frame.data[2] = 0xC0;
+    return true;
+  };
+}
 
 TEST_CASE("drives it must not arm") {
   Rig rig;
@@ -42,7 +51,7 @@ TEST_CASE("a drive that stops working stops the robot, with the reason") {
   rig.Start();
   REQUIRE(rig.Arm(1));
   rig.Run(50);
-  const char* expected = "";
+  const char *expected = "", *and_ends = "";
   int64_t at_most = 0;
   SECTION("watchdog in the heartbeat") {
     rig.Inject("041#0000000101030000");
@@ -70,17 +79,15 @@ TEST_CASE("a drive that stops working stops the robot, with the reason") {
     at_most = 130;
   }
   SECTION("estimates that are no numbers") {
-    rig.to_driver = [](Frame& frame) {
-      if (frame.id == 0x49) frame.data[3] = 0x7F, frame.data[2] = 0xC0;
-      return true;
-    };
+    rig.to_driver = NotANumber(0x49);
     expected = "knee1: no encoder estimate for 5";
+    and_ends = " ms: what came last is not a number";
     at_most = 60;
   }
   const int64_t took = rig.RunUntil(DriveState::kFault);
   CHECK(took >= 0);
   CHECK(took <= at_most);
-  CHECK_THAT(rig.Reason(), StartsWith(expected));
+  CHECK_THAT(rig.Reason(), StartsWith(expected) && EndsWith(and_ends));
   rig.Run(10);
   CHECK(rig.drives[0].Torque() == 0);  // the healthy one, too
   rig.Run(300);
@@ -88,6 +95,17 @@ TEST_CASE("a drive that stops working stops the robot, with the reason") {
   rig.to_drive = nullptr;
   rig.Run(300);
   CHECK_FALSE(rig.drives[1].armed());
+}
+
+TEST_CASE(
+    "estimates that are no numbers keep the robot from being armed, and are told from silence") {
+  Rig rig;
+  rig.to_driver = NotANumber(0x29);
+  rig.Start();
+  CHECK_FALSE(rig.Arm());
+  CHECK(rig.Reason() == "ARM refused: pivot: no encoder estimates: what came last is not a number");
+  rig.to_driver = nullptr;
+  CHECK(rig.Arm());
 }
 
 TEST_CASE("a person's stop is told from a fault") {

@@ -78,6 +78,8 @@ TEST_CASE("temperatures and supply are read, NaN until they have come") {
   CHECK(readings.motor_temperature == 36.25);
   CHECK(readings.bus_current == 1.25);
   CHECK(bench.Use("035#0000C07F00001142") == FrameUse::kRejected);  // not a number
+  CHECK(bench.Use("029#0000C07F00000000") == FrameUse::kNotFinite);
+  CHECK(bench.Use("029#000000000000807F") == FrameUse::kNotFinite);
   CHECK(bench.Use("037#0000C041") == FrameUse::kRejected);
   CHECK(bench.motor->readings().drive_temperature == 41.5);
   CHECK(bench.Use("03C#0000C03F0000B83F") == FrameUse::kConsumed);

@@ -155,7 +155,7 @@ TEST_CASE("a moteus without an encoder has no position, but a mode") {
   for (const auto& [at, number] : {std::pair{10, "0000c07f"}, std::pair{18, "0000807f"}}) {
     std::string other = good;
     other.replace(4, 2, "01").replace(static_cast<size_t>(at), 8, number);
-    CHECK(reports.OnFrame(Fd(0x100, other), 2) == FrameUse::kConsumed);
+    CHECK(reports.OnFrame(Fd(0x100, other), 2) == FrameUse::kNotFinite);
     CHECK(reports.mode() == kFaulted);
     CHECK(reports.estimate().position == Approx(2.5 * kTurn));
     CHECK(reports.estimate().velocity == Approx(-kTurn));
