@@ -244,6 +244,8 @@ std::string Progress::Conclusion(const Eigen::VectorXd& truth) const {
            truth.size() > 0 ? truth(static_cast<Eigen::Index>(i)) : NAN);
     }
     text += c.identifiability + ".\n";
+    // Where something is trained the decision on its policy says what to think of the model.
+    if (calibrates_only_ && !c.alarm.empty()) text += c.alarm + "\n";
   }
   if (const std::string why = Why(); !why.empty()) {
     text += fmt::format("policy {} runs since iteration {}: {}\n", training_.incumbent,

@@ -1,5 +1,7 @@
 #include "controller/controller.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -263,8 +265,14 @@ std::optional<joint_command_t> Controller::Act(const robot_state_t& state, int64
   const int64_t period = Microseconds(robot_.task.period);
   // Measurements come at their own rate: answer the one nearest to the decision's time.
   if (state.utime < next_decision_ - Microseconds(robot_.driver.measurement) / 2) return {};
-  if (state.utime > next_decision_ + period / 2)
-    return Halt("a state came half a control period late", utime);
+  if (state.utime > next_decision_ + period / 2) {
+    const int64_t interval = state.utime - next_decision_ + period;
+    return Halt(
+        fmt::format("a state came {:.3g} s after the one acted on, where the control period "
+                    "is {:g} s",
+                    Seconds(interval), robot_.task.period),
+        utime);
+  }
   next_decision_ += period;
   const auto q = Map(state.q), v = Map(state.v);
   if (status_.step > 0) {

@@ -34,6 +34,16 @@ std::string SchemeFault(const std::string& url) {
                      url.empty() ? "can0" : url);
 }
 
+/// The switch that people look for.
+void RefuseFdSwitch(const Config& table) {
+  for (const std::string& key : table.Keys()) {
+    if (key != "fd" && key != "canfd" && key != "can_fd") continue;
+    table.Fail(key,
+               "is not a known key: a bus carries CAN FD where it has data_bit_rate, [bit/s] of "
+               "the data");
+  }
+}
+
 std::string Names(const std::vector<BusDescription>& buses) {
   std::vector<std::string> names;
   names.reserve(buses.size());
@@ -76,6 +86,7 @@ std::vector<BusDescription> ReadBuses(Config& root) {
     bus.bit_rate = table.Number("bit_rate", {1e4, 1e6}, bus.bit_rate);
     if (table.Has("data_bit_rate"))
       bus.data_bit_rate = table.Number("data_bit_rate", {bus.bit_rate, 8e6});
+    RefuseFdSwitch(table);
     table.Finish();
     buses.push_back(bus);
     if (const BusDescription* same = SameBefore(buses, buses.size() - 1))

@@ -28,21 +28,11 @@ constexpr MotorTable kMotorTables[] = {
     {"rmd", &ReadRmd, &CheckRmd},
 };
 
-// The protocols that have no table are for the drivers to know.
+// That there is no such protocol is for the drivers to say, who know all of them.
 bool IsMisspelt(const std::string& protocol, const char* table) {
   if (std::ranges::any_of(kMotorTables, [&](const auto& t) { return protocol == t.protocol; }))
     return false;
   return EditDistance(InSmallLetters(protocol), table) <= 2;
-}
-
-[[noreturn]] void FailAtTable(const Config& config, const std::string& protocol,
-                              const char* table) {
-  if (IsMisspelt(protocol, table)) {
-    config.Fail("protocol",
-                fmt::format("= \"{}\" is not a known protocol; did you mean {}?", protocol, table));
-  }
-  config.Fail(table,
-              fmt::format("is of protocol \"{}\", but the motor's is \"{}\"", table, protocol));
 }
 
 MotorDescription ReadMotor(Config& config, const std::vector<BusDescription>& buses) {
@@ -57,8 +47,9 @@ MotorDescription ReadMotor(Config& config, const std::vector<BusDescription>& bu
   for (const MotorTable& table : kMotorTables) {
     if (motor.protocol == table.protocol) {
       table.read(config, motor);
-    } else if (config.Has(table.protocol)) {
-      FailAtTable(config, motor.protocol, table.protocol);
+    } else if (config.Has(table.protocol) && !IsMisspelt(motor.protocol, table.protocol)) {
+      config.Fail(table.protocol, fmt::format("is of protocol \"{}\", but the motor's is \"{}\"",
+                                              table.protocol, motor.protocol));
     }
   }
   return motor;

@@ -173,6 +173,17 @@ class EpisodeJoiner {
   int64_t cut_off_ = 0, implausible_ = 0;
 };
 
+// Estimates at another rate, and messages that were lost, are told apart: most drops are of a kind.
+std::string WhyDropped(const DropCounts& drops, double period) {
+  if (2 * drops.late > drops.total()) {
+    return fmt::format(
+        "its commands answer states {:.6g} s apart, but the task's control period is {:.6g} s",
+        drops.late_interval, period);
+  }
+  const bool lost = 2 * drops.gap > drops.total();
+  return (lost ? "states or commands are missing: " : "") + drops.summary();
+}
+
 }  // namespace
 
 Log ReadLcmLog(const std::string& file, const RobotDescription& robot) {
@@ -219,7 +230,7 @@ Log ReadLcmLog(const std::string& file, const RobotDescription& robot) {
   } else if (log.drops.total() == 0) {
     why = "it holds no command of an episode";
   } else {
-    why = log.drops.summary();
+    why = WhyDropped(log.drops, robot.task.period);
   }
   if (counts.events > 0 && counts.cut_off) why += "; its last message is cut off";
   throw std::runtime_error(file + ": no transition can be used: " + why);

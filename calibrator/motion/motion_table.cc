@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <numeric>
 #include <stdexcept>
 #include <utility>
 
@@ -22,8 +21,7 @@
 namespace plumb {
 namespace {
 
-constexpr double kLatest = 1e12;           // [s]; Unix time in nanoseconds is none
-constexpr double kBeyondLimit = 1 + 1e-9;  // an effort so far beyond its limit is not just rounded
+constexpr double kLatest = 1e12;  // [s]; Unix time in nanoseconds is none
 
 double Number(const CsvReader& table, int column, double greatest = kGreatestQuantity) {
   const double number = table.Number(column);
@@ -65,8 +63,7 @@ class Efforts {
       : task_(MakeTask(robot)),
         limits_(robot.effort_limits()),
         velocities_(robot.num_velocities()),
-        clipped_(robot.driven().size(), 0),
-        known_(clipped_) {}
+        counts_(robot.driven().size()) {}
 
   Eigen::VectorXd operator()(const Eigen::VectorXd& action) {
     Eigen::VectorXd effort = Eigen::VectorXd::Zero(velocities_);
@@ -74,24 +71,23 @@ class Efforts {
       const double asked = action(i) * task_->action_unit(i);
       double& given = effort(task_->action_indices()[static_cast<size_t>(i)]);
       given = std::isnan(asked) ? kNaN : std::clamp(asked, -limits_(i), limits_(i));
-      clipped_[static_cast<size_t>(i)] += std::abs(asked) > limits_(i) * kBeyondLimit;
-      known_[static_cast<size_t>(i)] += !std::isnan(asked);
+      counts_[static_cast<size_t>(i)].Add(asked, limits_(i));
     }
     return effort;
   }
 
   std::vector<std::string> Warnings(const ColumnNames& names, const RobotDescription& robot) const {
     std::vector<std::string> warnings;
-    const int64_t clipped = std::accumulate(clipped_.begin(), clipped_.end(), int64_t{0});
+    int64_t clipped = 0;
+    for (const ActionCounts& counts : counts_) clipped += counts.clipped;
     if (clipped > 0) {
       warnings.push_back(fmt::format(
           "{} actions go beyond the effort limits: clipped, as the task does", clipped));
     }
     const std::vector<int> driven = robot.driven();
-    for (size_t i = 0; i < clipped_.size(); ++i) {
-      std::string question =
-          AskActionUnit(names.u[i], robot.joints[static_cast<size_t>(driven[i])],
-                        task_->action_unit(static_cast<int>(i)), clipped_[i], known_[i]);
+    for (size_t i = 0; i < counts_.size(); ++i) {
+      std::string question = AskActionUnit(names.u[i], robot.joints[static_cast<size_t>(driven[i])],
+                                           task_->action_unit(static_cast<int>(i)), counts_[i]);
       if (!question.empty()) warnings.push_back(std::move(question));
     }
     return warnings;
@@ -101,7 +97,7 @@ class Efforts {
   std::unique_ptr<Task> task_;
   Eigen::VectorXd limits_;
   int velocities_;
-  std::vector<int64_t> clipped_, known_;  // of each action
+  std::vector<ActionCounts> counts_;  // of each action
 };
 
 /// Quaternions of unit length, each the continuation of the row's before.

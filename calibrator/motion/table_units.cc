@@ -10,7 +10,11 @@
 namespace plumb {
 namespace {
 
-constexpr double kMost = 0.5;  // of the rows
+constexpr double kMost = 0.5, kSome = 0.01;  // of the rows
+constexpr double kBeyondLimit = 1 + 1e-9;  // an effort so far beyond its limit is not just rounded
+// A policy that explores with a Gaussian, and is clipped in less than most rows, asks for more than
+// this in one of 1300.
+constexpr double kManyTimes = 5;  // the effort limit
 // of the range between a joint's limits: a stop gives way, and an encoder may have turned on
 constexpr double kFar = 0.5;
 
@@ -76,13 +80,24 @@ std::vector<std::string> AskStateUnits(const std::vector<MotionRow>& rows, bool 
   return questions;
 }
 
+void ActionCounts::Add(double asked, double limit) {
+  known += !std::isnan(asked);
+  clipped += std::abs(asked) > kBeyondLimit * limit;
+  far += std::abs(asked) > kManyTimes * limit;
+}
+
 std::string AskActionUnit(const std::string& column, const JointDescription& joint, double unit,
-                          int64_t clipped, int64_t known) {
-  if (static_cast<double>(clipped) <= kMost * static_cast<double>(known)) return {};
+                          const ActionCounts& counts) {
+  const auto known = static_cast<double>(counts.known);
+  const bool most = static_cast<double>(counts.clipped) > kMost * known;
+  if (!most && static_cast<double>(counts.far) <= kSome * known) return {};
   const char* const newtons = Slides(joint) ? "N" : "Nm";
   const std::string ask = unit == 1 ? fmt::format("m{}?", newtons)
                                     : fmt::format("{}? 1 is {:g} {}", newtons, unit, newtons);
-  return fmt::format("{}: {} of {} are beyond the effort limit: {}", column, clipped, known, ask);
+  return most ? fmt::format("{}: {} of {} are beyond the effort limit: {}", column, counts.clipped,
+                            counts.known, ask)
+              : fmt::format("{}: {} of {} are beyond {:g} times the effort limit: {}", column,
+                            counts.far, counts.known, kManyTimes, ask);
 }
 
 std::string AskTimeUnit(double interval, double period) {

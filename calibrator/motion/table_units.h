@@ -17,11 +17,20 @@ namespace plumb {
 std::vector<std::string> AskStateUnits(const std::vector<MotionRow>& rows, bool velocities,
                                        const RobotDescription& robot);
 
-/// Of an action that is beyond the effort limit in most rows; else nothing.
+/// How many values of an action there are, and how large. Plain data: not thread-safe.
+struct ActionCounts {
+  int64_t known = 0;
+  int64_t clipped = 0;  ///< beyond the effort limit, by more than rounding
+  int64_t far = 0;      ///< many times beyond it, where no exploring policy goes
+  /// @param asked effort, NaN = not known.
+  void Add(double asked, double limit);
+};
+
+/// Of an action that is beyond the effort limit in most rows, or many times beyond it in some: of
+/// a motor that idles, few rows tell. Else nothing.
 /// @param column its name. @param unit [Nm or N] of 1 in it, Task::action_unit.
-/// @param clipped so many of its `known` values.
 std::string AskActionUnit(const std::string& column, const JointDescription& joint, double unit,
-                          int64_t clipped, int64_t known);
+                          const ActionCounts& counts);
 
 /// Of rows that are so far apart [s] and should be a control period; else nothing.
 std::string AskTimeUnit(double interval, double period);

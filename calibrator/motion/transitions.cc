@@ -80,6 +80,7 @@ std::string DropCounts::summary() const {
 }
 
 DropCounts& DropCounts::operator+=(const DropCounts& other) {
+  if (other.late > 0) late_interval = other.late_interval;
   gap += other.gap, late += other.late, not_finite += other.not_finite, restart += other.restart;
   model_based += other.model_based;
   return *this;
@@ -201,7 +202,7 @@ bool TransitionJoiner::JoinOne(int64_t from, int64_t to, Transition* transition,
   }
   const double duration = Seconds(last->second.utime - first->second.utime);
   if (!(std::abs(duration - period_) <= kPeriodTolerance * period_)) {
-    ++drops->late;
+    ++drops->late, drops->late_interval = duration;
     return false;
   }
   bool physical = true;

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "common/special_numbers.h"
 #include "plumb/joint_command_t.hpp"
 #include "plumb/robot_state_t.hpp"
 #include "robot/configuration_space.h"
@@ -51,6 +52,7 @@ inline constexpr double kPeriodTolerance = 0.2;
 struct DropCounts {
   int64_t gap = 0;   ///< a state or a command is missing
   int64_t late = 0;  ///< the interval is not one control period (within kPeriodTolerance)
+  double late_interval = kNaN;  ///< [s] of the newest of these
   /// a number is not finite or not physical (robot/physical.h), an effort is unknown, or a
   /// quaternion is no unit one
   int64_t not_finite = 0;

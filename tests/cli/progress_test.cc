@@ -105,6 +105,22 @@ TEST_CASE_METHOD(Fixture, "what was learned stands beside the truth, combination
   CHECK(progress.Conclusion({}).find('%') == std::string::npos);
 }
 
+TEST_CASE_METHOD(Fixture, "a run that only calibrates ends with what the alarm says") {
+  calibration_status_t status = Calibration(1);
+  status.alarm = "the model cannot explain this log: pivot, free";
+  Progress calibrates(robot, 1, true);
+  calibrates.OnCalibration(status);
+  CHECK(calibrates.finished());
+  CHECK_THAT(calibrates.Conclusion({}),
+             Catch::Contains("can be known.\nthe model cannot explain this log: pivot, free\n"));
+  progress.OnCalibration(status);  // a decision on a policy follows
+  CHECK_THAT(progress.Conclusion({}), !Catch::Contains("cannot explain"));
+  status.alarm.clear();
+  Progress explained(robot, 1, true);
+  explained.OnCalibration(status);
+  CHECK_THAT(explained.Conclusion({}), Catch::Contains("can be known.\ntime: "));
+}
+
 TEST_CASE_METHOD(
     Fixture,
     "the run's clock is told apart from real time, and only the former is in the summary") {

@@ -71,6 +71,9 @@ TEST_CASE_METHOD(Surroundings,
     now += 60'000, utime += 60'000;
     robot_state.sequence += 12;
     command = Step();
+    CHECK_THAT(controller.status().reason,
+               Catch::StartsWith("a state came 0.08 s after") &&
+                   Catch::EndsWith("the one acted on, where the control period is 0.05 s"));
   }
   REQUIRE(controller.phase() == S::HALTED);
   REQUIRE(command);

@@ -111,6 +111,11 @@ TEST_CASE("mistakes about buses are at their lines") {
   RefusedOfTwoBuses("bit_rate = 5e5", "bitrate = 5e5", "10:11: bus[1].bitrate is not a known key");
   RefusedOfTwoBuses("passive = true\n", "passive = true\nbus = \"left\"\n",
                     "39:7: joint[1].bus is of a motor, but the joint is passive");
+  for (const std::string fd : {"fd", "canfd", "can_fd"}) {
+    RefusedOfTwoBuses("data_bit_rate = 2e6", fd + " = true",
+                      "11:" + std::to_string(fd.size() + 4) + ": bus[1]." + fd +
+                          " is not a known key: a bus carries CAN FD where it has data_bit_rate");
+  }
   // Nothing is on it.
   RefusedOfTwoBuses("[driver]", "[[bus]]\nname = \"spare\"\nurl = \"socketcan:can2\"\n[driver]",
                     "13:8: bus[2].name = \"spare\" has no joint and no sensor on it");

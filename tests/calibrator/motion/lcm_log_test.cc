@@ -173,7 +173,7 @@ TEST_CASE("hostile numbers in messages do no harm") {
 }
 
 TEST_CASE("a log that is of no use is refused with the reason") {
-  Recording other, states, commands, foreign, late, damaged, assumed;
+  Recording other, states, commands, foreign, late, halved, damaged, assumed;
   other.AddBytes("CAMERA", "anything");
   states.States(0, 100);
   commands.Command(0, 5, 0);
@@ -182,6 +182,8 @@ TEST_CASE("a log that is of no use is refused with the reason") {
   for (int i = 0; i < 5; ++i) late.Command(30 * i, 5, i);
   late.Command(150, -1, -1);
   late.States(0, 200);
+  for (int i = 0; i <= 5; ++i) halved.Command(10 * i, i < 5 ? 5 : -1, i < 5 ? i : -1);
+  for (int i = 0; i <= 200; i += 2) halved.State(i);
   damaged.Episode(100, 30, 20);
   assumed.model_based = true;
   assumed.Episode(100, 30, 20);
@@ -205,10 +207,14 @@ TEST_CASE("a log that is of no use is refused with the reason") {
        none +
            "none of its 1 messages is a ROBOT_STATE_SMOOTHED, JOINT_COMMAND or CONTROLLER_STATUS"},
       {"no command", states.bytes, none + "it holds no command of an episode"},
-      {"no state", commands.bytes, none + "2 gaps, 0 late, 0 not finite, 0 across restarts"},
+      {"no state", commands.bytes,
+       none + "states or commands are missing: 2 gaps, 0 late, 0 not finite, 0 across restarts"},
+      {"every second state is lost", halved.bytes,
+       none + "states or commands are missing: 5 gaps, 0 late, 0 not finite, 0 across restarts"},
       {"wrong robot", foreign.bytes,
        none + "10 messages are of a robot with 3 coordinates, 'pendulum' has 1"},
-      {"another rate", late.bytes, none + "0 gaps, 5 late, 0 not finite, 0 across restarts"},
+      {"another rate", late.bytes,
+       none + "its commands answer states 0.15 s apart, but the task's control period is 0.05 s"},
       {"a state from the simulator's dynamics", assumed.bytes,
        ": its states are model-based: calibration would find the parameters that the estimator "
        "assumed. ROBOT_STATE_SMOOTHED "

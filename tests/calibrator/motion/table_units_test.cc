@@ -65,9 +65,29 @@ TEST_CASE("actions that are nearly all clipped are asked about, joint by joint")
   CHECK_THAT(warnings[1], Catch::StartsWith("u/pivot: ") &&
                               Catch::EndsWith(" of 100 are beyond the effort limit: mNm?"));
   const RobotDescription hopper = Robot("hopper/gym.toml");
-  CHECK(AskActionUnit("u/thigh", hopper.joints[3], 200, 6, 10) ==
+  CHECK(AskActionUnit("u/thigh", hopper.joints[3], 200, {10, 6, 0}) ==
         "u/thigh: 6 of 10 are beyond the effort limit: Nm? 1 is 200 Nm");
-  CHECK(AskActionUnit("u/thigh", hopper.joints[3], 200, 5, 10).empty());
+  CHECK(AskActionUnit("u/thigh", hopper.joints[3], 200, {10, 5, 0}).empty());
+}
+
+// A pendulum that is pushed in every so many rows, with so many times its effort limit, and idles.
+std::string Pushed(int every, double limits) {
+  std::string csv = "t,q/pivot,v/pivot,u/pivot\n";
+  for (int k = 0; k < 400; ++k) {
+    csv += fmt::format("{},{},{},{}\n", 0.05 * k, std::sin(0.3 * k), 6 * std::cos(0.3 * k),
+                       k % every == 0 ? 2 * limits : 0.1 * std::sin(k));
+  }
+  return csv;
+}
+
+TEST_CASE("a motor that idles, and is many times beyond its limit where it does not, is asked") {
+  const auto warnings = ReadTable(Pushed(10, 300), LimitedPendulum()).warnings;
+  REQUIRE(warnings.size() == 2);
+  CHECK(warnings[0] == "40 actions go beyond the effort limits: clipped, as the task does");
+  CHECK(warnings[1] == "u/pivot: 40 of 400 are beyond 5 times the effort limit: mNm?");
+  // One bad reading, and what is a little beyond, as actions are before they are clipped.
+  CHECK(ReadTable(Pushed(400, 300), LimitedPendulum()).warnings.size() == 1);
+  CHECK(ReadTable(Pushed(10, 4), LimitedPendulum()).warnings.size() == 1);
 }
 
 TEST_CASE("rows a thousand control periods apart are asked about milliseconds") {
