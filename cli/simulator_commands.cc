@@ -51,54 +51,65 @@ void AddSim(CLI::App& app, Action& action) {
   SetAction(*sim, action, [flags](Process& process) { return Simulate(process, *flags); });
 }
 
+void AddRecordings(CLI::App& calibrate, CalibrateFlags& flags) {
+  calibrate.add_option("robot", flags.robot, "robot folder or TOML file")->required();
+  calibrate.add_option("--log", flags.logs, "LCM log; may be given several times")
+      ->allow_extra_args(false);
+  calibrate
+      .add_option("--csv", flags.tables,
+                  "table of transitions, columns: docs/commands.md; may be given several times")
+      ->allow_extra_args(false);
+}
+
+void AddMethod(CLI::App& calibrate, CalibrationOptions& options) {
+  calibrate.add_option("--method", options.method, "of inference")
+      ->check(CLI::IsMember(CalibrationMethods()))
+      ->capture_default_str();
+  calibrate.footer(MethodHelp());
+  calibrate.add_option("--seed", options.seed, "of all random numbers")
+      ->check(SeedRange())
+      ->capture_default_str();
+}
+
+void AddFindings(CLI::App& calibrate, CalibrateFlags& flags) {
+  calibrate.add_option("--output", flags.output, "the posterior, for programs (JSON)")
+      ->capture_default_str();
+  calibrate.add_option("--report", flags.report, "the findings, for people: an HTML page");
+  calibrate.add_option("--urdf", flags.urdf, "the robot's URDF with the identified parameters");
+}
+
+void AddFit(CLI::App& calibrate, CalibrateFlags& flags) {
+  calibrate
+      .add_option("--horizons", flags.options.horizons,
+                  "control steps of the windows, stage by stage")
+      ->check(CLI::Range(1, 1000))
+      ->delimiter(',')
+      ->capture_default_str();
+  calibrate
+      .add_option_function<double>(
+          "--budget",
+          [&flags](double transitions) { flags.options.budget = std::llround(transitions); },
+          "transitions that sampling methods may simulate, e.g. 1e6")
+      ->check(CLI::Range(100.0, 1e12))
+      ->default_str(std::to_string(flags.options.budget));
+  calibrate
+      .add_option("--discrepancy", flags.options.discrepancy,
+                  "of methods that know only simulations")
+      ->capture_default_str();
+  calibrate
+      .add_option("--threads", flags.threads, "0 = one per core; the result does not depend on it")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+}
+
 void AddCalibrate(CLI::App& app, const std::string& line, Action& action) {
   const auto flags = std::make_shared<CalibrateFlags>();
   CLI::App* calibrate = AddCommand(
       app, "calibrate", "infer from logs which simulators could have produced the robot's motion");
-  calibrate->add_option("robot", flags->robot, "robot folder or TOML file")->required();
-  calibrate->add_option("--log", flags->logs, "LCM log; may be given several times")
-      ->allow_extra_args(false);
-  calibrate
-      ->add_option("--csv", flags->tables,
-                   "table of transitions, columns: docs/commands.md; may be given several times")
-      ->allow_extra_args(false);
-  auto* method = calibrate->add_option("--method", flags->options.method, "of inference")
-                     ->check(CLI::IsMember(CalibrationMethods()))
-                     ->capture_default_str();
-  calibrate->footer(MethodHelp());
-  calibrate->add_option("--seed", flags->options.seed, "of all random numbers")
-      ->check(SeedRange())
-      ->capture_default_str();
-  auto* output =
-      calibrate->add_option("--output", flags->output, "the posterior, for programs (JSON)")
-          ->capture_default_str();
-  auto* report =
-      calibrate->add_option("--report", flags->report, "the findings, for people: an HTML page");
-  auto* urdf = calibrate->add_option("--urdf", flags->urdf,
-                                     "the robot's URDF with the identified parameters");
-  auto* horizons = calibrate
-                       ->add_option("--horizons", flags->options.horizons,
-                                    "control steps of the windows, stage by stage")
-                       ->check(CLI::Range(1, 1000))
-                       ->delimiter(',')
-                       ->capture_default_str();
-  auto* budget =
-      calibrate
-          ->add_option_function<double>(
-              "--budget",
-              [flags](double transitions) { flags->options.budget = std::llround(transitions); },
-              "transitions that sampling methods may simulate, e.g. 1e6")
-          ->check(CLI::Range(100.0, 1e12))
-          ->default_str(std::to_string(flags->options.budget));
-  auto* discrepancy = calibrate
-                          ->add_option("--discrepancy", flags->options.discrepancy,
-                                       "of methods that know only simulations")
-                          ->capture_default_str();
-  auto* threads = calibrate
-                      ->add_option("--threads", flags->threads,
-                                   "0 = one per core; the result does not depend on it")
-                      ->check(CLI::Range(0, 1024))
-                      ->capture_default_str();
+  AddRecordings(*calibrate, *flags);
+  AddMethod(*calibrate, flags->options);
+  AddFindings(*calibrate, *flags);
+  AddFit(*calibrate, *flags);
   auto* sbc =
       calibrate
           ->add_option(
@@ -106,9 +117,8 @@ void AddCalibrate(CLI::App& app, const std::string& line, Action& action) {
               "instead: that many runs of simulation-based calibration on motions like these")
           ->check(CLI::Range(0, 1000000))
           ->capture_default_str();
-  auto* no_residual =
-      calibrate->add_flag("!--no-residual", flags->options.residual,
-                          "do not learn what the model lacks where it cannot explain the robot");
+  calibrate->add_flag("!--no-residual", flags->options.residual,
+                      "do not learn what the model lacks where it cannot explain the robot");
   auto* model = calibrate->add_option(
       "--model", flags->model,
       "instead of our simulator: one that an UM-Bridge server has, http://HOST:PORT");
@@ -117,15 +127,15 @@ void AddCalibrate(CLI::App& app, const std::string& line, Action& action) {
                    "of that server's: parameters -> q, v at each transition's end")
       ->needs(model)
       ->capture_default_str();
-  auto* replay =
-      calibrate->add_flag("--replay", flags->options.replay,
-                          "say how far motion that was held out is from its open-loop replay");
-  auto* strict = calibrate->add_flag("--strict", flags->strict,
-                                     "exit status 3 if the findings should not be trusted");
+  calibrate->add_flag("--replay", flags->options.replay,
+                      "say how far motion that was held out is from its open-loop replay");
+  calibrate->add_flag("--strict", flags->strict,
+                      "exit status 3 if the findings should not be trusted");
   // What would have no effect.
-  sbc->excludes(model, method, output, report, urdf, horizons, budget, discrepancy, no_residual,
-                replay);
-  model->excludes(report, horizons, budget, discrepancy, no_residual, replay, strict, threads);
+  sbc->excludes("--model", "--method", "--output", "--report", "--urdf", "--horizons", "--budget",
+                "--discrepancy", "--no-residual", "--replay");
+  model->excludes("--report", "--horizons", "--budget", "--discrepancy", "--no-residual",
+                  "--replay", "--strict", "--threads");
   const auto calibrates = [flags, line](Process& process) {
     return CalibrateLogs(process, *flags, line);
   };

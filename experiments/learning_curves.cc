@@ -191,6 +191,26 @@ std::string Each(const Curves& curves, const std::string& format, F&& value) {
   return text;
 }
 
+std::string Sentence(const RobotDescription& robot, int64_t steps, const Curves& curves,
+                     double threshold) {
+  double mean = 0;
+  for (const auto& [seed, curve] : curves)
+    mean += curve.evaluation / static_cast<double>(curves.size());
+  std::string text = fmt::format(
+      "{}, {} steps, {} seeds: return without exploration {:.0f} (each {}); of the last {} batches "
+      "{}",
+      robot.name, steps, curves.size(), mean,
+      Each(curves, "{:.0f}", [](const Curve& c) { return c.evaluation; }), kLastBatches,
+      Each(curves, "{:.0f}", [](const Curve& c) { return c.last(); }));
+  if (std::isfinite(threshold)) {
+    text +=
+        fmt::format("; {} reached after {} steps", threshold,
+                    Each(curves, "{:.0f}", [&](const Curve& c) { return c.Reached(threshold); }));
+  }
+  return text +
+         fmt::format("; {} s\n", Each(curves, "{:.1f}", [](const Curve& c) { return c.seconds; }));
+}
+
 int RunSeeds(Process& process, const Options& options) {
   RobotDescription robot = LoadRobot(options.robot);
   if (options.paper) robot.training = PaperSettings(robot.training);
@@ -222,23 +242,7 @@ int RunSeeds(Process& process, const Options& options) {
       robot.name, options.distribution, curves.size(),
       options.paper ? ", the paper's settings" : "");
   WriteAtomically(folder / "learning_curves.svg", Draw(curves, static_cast<double>(steps), title));
-
-  double mean = 0;
-  for (const auto& [seed, curve] : curves)
-    mean += curve.evaluation / static_cast<double>(curves.size());
-  std::cout << fmt::format(
-      "{}, {} steps, {} seeds: return without exploration {:.0f} (each {}); of the last {} batches "
-      "{}",
-      robot.name, steps, curves.size(), mean,
-      Each(curves, "{:.0f}", [](const Curve& c) { return c.evaluation; }), kLastBatches,
-      Each(curves, "{:.0f}", [](const Curve& c) { return c.last(); }));
-  if (std::isfinite(options.threshold)) {
-    std::cout << fmt::format(
-        "; {} reached after {} steps", options.threshold,
-        Each(curves, "{:.0f}", [&](const Curve& c) { return c.Reached(options.threshold); }));
-  }
-  std::cout << fmt::format("; {} s\n",
-                           Each(curves, "{:.1f}", [](const Curve& c) { return c.seconds; }));
+  std::cout << Sentence(robot, steps, curves, options.threshold);
   return 0;
 }
 

@@ -29,10 +29,8 @@ Quadratic MeanDistances(const std::vector<MatrixXd>& predictions, const MatrixXd
   return mean;
 }
 
-}  // namespace
-
-PopulationWeights FitPopulation(const std::vector<MatrixXd>& predictions, const MatrixXd& outcomes,
-                                double tolerance) {
+// The simulators that have not failed.
+std::vector<Index> FiniteOnes(const std::vector<MatrixXd>& predictions, const MatrixXd& outcomes) {
   if (predictions.empty() || static_cast<Index>(predictions.size()) != outcomes.cols() ||
       !outcomes.allFinite()) {
     throw std::invalid_argument(
@@ -50,7 +48,14 @@ PopulationWeights FitPopulation(const std::vector<MatrixXd>& predictions, const 
     if (finite) simulators.push_back(n);
   }
   if (simulators.empty()) throw std::invalid_argument("every simulator failed");
+  return simulators;
+}
 
+}  // namespace
+
+PopulationWeights FitPopulation(const std::vector<MatrixXd>& predictions, const MatrixXd& outcomes,
+                                double tolerance) {
+  const std::vector<Index> simulators = FiniteOnes(predictions, outcomes);
   const Quadratic f = MeanDistances(predictions, outcomes, simulators);
   Index from, to;
   f.a.minCoeff(&to);
@@ -73,6 +78,7 @@ PopulationWeights FitPopulation(const std::vector<MatrixXd>& predictions, const 
     w(from) = length == w(from) ? 0 : w(from) - length;
     gradient -= length * (f.k.col(to) - f.k.col(from));
   }
+  const Index count = predictions[0].cols();
   PopulationWeights result{VectorXd::Zero(count), f.a.dot(w) - 0.5 * w.dot(f.k * w), gap,
                            static_cast<int>(count - f.a.size())};
   result.weights(simulators) = w / w.sum();

@@ -27,6 +27,69 @@ std::unique_ptr<Engine> WithPhysics(std::unique_ptr<Engine> engine,
   return engine;
 }
 
+Vector3d Vector(const double* numbers) { return Vector3d::Map(numbers); }
+
+// Masses, and where joints are and how they turn.
+void DescribeLinks(const Topology& topology, const Physics<double>& physics,
+                   RobotDescription* robot) {
+  for (size_t i = 0; i < robot->joints.size(); ++i) {
+    const Physics<double>::Link& now = physics.links[i];
+    const Matrix3d& axes = topology.link_axes[i + 1];
+    LinkDescription& link = robot->links[i + 1];
+    link.mass = now.mass;
+    link.center_of_mass = axes.transpose() * Vector(now.center);
+    Matrix3d inertia;
+    inertia << now.inertia[0], now.inertia[3], now.inertia[4],  //
+        now.inertia[3], now.inertia[1], now.inertia[5],         //
+        now.inertia[4], now.inertia[5], now.inertia[2];
+    link.inertia = axes.transpose() * inertia * axes;
+    JointDescription& joint = robot->joints[i];
+    joint.origin =
+        topology.link_axes[static_cast<size_t>(joint.parent)].transpose() * Vector(now.origin);
+    joint.dynamics = physics.axes[static_cast<size_t>(topology.joints[i].velocity)];
+  }
+}
+
+// Balls where points touch the ground; but meshes, and what touches other links, stay what they
+// are.
+void DescribePoints(const Topology& topology, const Physics<double>& physics,
+                    const ContactPairs& touching, RobotDescription* robot) {
+  std::vector<bool> touches(robot->links.size());
+  for (const ContactPairs::Solid& at : touching.solids)
+    touches[static_cast<size_t>(at.link)] = true;
+  size_t point = 0;
+  for (size_t i = 1; i < robot->links.size(); ++i) {
+    std::vector<Shape> shapes;
+    for (Shape shape : robot->links[i].collisions) {
+      const size_t count = ContactSpheres(shape).size();
+      for (size_t k = 0; k < count; ++k) {
+        const Physics<double>::Point& now = physics.points[point++];
+        const Vector3d centre = topology.link_axes[i].transpose() * Vector(now.position);
+        if (shape.type == Shape::Type::kMesh) {
+          shape.corners[k] = shape.rotation.transpose() * (centre - shape.position);
+        } else if (!touches[i]) {
+          shapes.push_back({.position = centre, .size = Vector3d(now.radius, 0, 0)});
+        }
+      }
+      if (touches[i] || shape.type == Shape::Type::kMesh) shapes.push_back(std::move(shape));
+    }
+    robot->links[i].collisions = std::move(shapes);
+  }
+}
+
+// Shapes that may touch those of other links.
+void DescribeSolids(const Topology& topology, const Physics<double>& physics,
+                    const ContactPairs& touching, RobotDescription* robot) {
+  for (size_t i = 0; i < touching.solids.size(); ++i) {
+    const auto link = static_cast<size_t>(touching.solids[i].link);
+    const Physics<double>::Solid& now = physics.solids[i];
+    Shape& shape = robot->links[link].collisions[touching.solids[i].shape];
+    shape.position = topology.link_axes[link].transpose() * Vector(now.position);
+    if (shape.type == Shape::Type::kBox) shape.size = 2 * Vector(now.half);
+    if (shape.type == Shape::Type::kCapsule) shape.size.y() = 2 * now.half[2];
+  }
+}
+
 }  // namespace
 
 Model::Model(const RobotDescription& description)
@@ -85,57 +148,11 @@ RobotDescription Model::Describe(const Eigen::Ref<const Eigen::VectorXd>& physic
   robot.parameters.clear();
   robot.frozen.clear();
   robot.virtual_robot.hidden.clear();
-  const auto vector = [](const double* numbers) { return Vector3d(Vector3d::Map(numbers)); };
-  size_t point = 0;
-  for (size_t i = 0; i < robot.joints.size(); ++i) {
-    const Physics<double>::Link& now = physics.links[i];
-    const Matrix3d& axes = topology_.link_axes[i + 1];
-    LinkDescription& link = robot.links[i + 1];
-    link.mass = now.mass;
-    link.center_of_mass = axes.transpose() * vector(now.center);
-    Matrix3d inertia;
-    inertia << now.inertia[0], now.inertia[3], now.inertia[4],  //
-        now.inertia[3], now.inertia[1], now.inertia[5],         //
-        now.inertia[4], now.inertia[5], now.inertia[2];
-    link.inertia = axes.transpose() * inertia * axes;
-    JointDescription& joint = robot.joints[i];
-    joint.origin =
-        topology_.link_axes[static_cast<size_t>(joint.parent)].transpose() * vector(now.origin);
-    joint.dynamics = physics.axes[static_cast<size_t>(topology_.joints[i].velocity)];
-  }
-  SimulationSettings& settings = robot.simulation;
-  settings.set_world(physics.world);
-  // Balls where points touch the ground; but meshes, and what touches other links, stay what they
-  // are.
+  robot.simulation.set_world(physics.world);
+  DescribeLinks(topology_, physics, &robot);
   const ContactPairs touching = FindContactPairs(description_);
-  std::vector<bool> touches(robot.links.size());
-  for (const ContactPairs::Solid& at : touching.solids)
-    touches[static_cast<size_t>(at.link)] = true;
-  for (size_t i = 1; settings.contact && i < robot.links.size(); ++i) {
-    std::vector<Shape> shapes;
-    for (Shape shape : robot.links[i].collisions) {
-      const size_t count = ContactSpheres(shape).size();
-      for (size_t k = 0; k < count; ++k) {
-        const Physics<double>::Point& now = physics.points[point++];
-        const Vector3d centre = topology_.link_axes[i].transpose() * vector(now.position);
-        if (shape.type == Shape::Type::kMesh) {
-          shape.corners[k] = shape.rotation.transpose() * (centre - shape.position);
-        } else if (!touches[i]) {
-          shapes.push_back({.position = centre, .size = Vector3d(now.radius, 0, 0)});
-        }
-      }
-      if (touches[i] || shape.type == Shape::Type::kMesh) shapes.push_back(std::move(shape));
-    }
-    robot.links[i].collisions = std::move(shapes);
-  }
-  for (size_t i = 0; i < touching.solids.size(); ++i) {
-    const auto link = static_cast<size_t>(touching.solids[i].link);
-    const Physics<double>::Solid& now = physics.solids[i];
-    Shape& shape = robot.links[link].collisions[touching.solids[i].shape];
-    shape.position = topology_.link_axes[link].transpose() * vector(now.position);
-    if (shape.type == Shape::Type::kBox) shape.size = 2 * vector(now.half);
-    if (shape.type == Shape::Type::kCapsule) shape.size.y() = 2 * now.half[2];
-  }
+  if (robot.simulation.contact) DescribePoints(topology_, physics, touching, &robot);
+  DescribeSolids(topology_, physics, touching, &robot);
   return robot;
 }
 

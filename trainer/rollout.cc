@@ -18,6 +18,40 @@ constexpr int kMaxTogether = 8;
 // Episodes after which a batch may be given up, as nearly all of them were dropped.
 constexpr int kFewestJudged = 40;
 
+// A session has let in distributions of which half of a sample can be simulated: of a few episodes
+// most may break, and nothing that was let in is to end a trainer.
+void RequireUsable(const Batch& batch) {
+  if (10 * batch.dropped <= 9 * batch.played || batch.played < kFewestJudged) return;
+  throw std::runtime_error(
+      fmt::format("{} of {} simulated episodes were not finite or had impossible parameters: "
+                  "nothing to learn from",
+                  batch.dropped, batch.played));
+}
+
+// The numbers of those of lowest return, ascending.
+std::vector<size_t> Worst(const std::vector<EpisodeRecord>& records, double share) {
+  std::vector<size_t> kept(records.size());
+  std::iota(kept.begin(), kept.end(), 0);
+  if (share >= 1) return kept;
+  std::stable_sort(kept.begin(), kept.end(),
+                   [&](size_t a, size_t b) { return records[a].sum < records[b].sum; });
+  kept.resize(static_cast<size_t>(std::ceil(share * static_cast<double>(records.size()))));
+  std::sort(kept.begin(), kept.end());
+  return kept;
+}
+
+void Append(const EpisodeRecord& record, Batch* batch) {
+  const auto append = [](const auto& from, auto* to) {
+    to->insert(to->end(), from.begin(), from.end());
+  };
+  const int begin = batch->size();
+  append(record.observations, &batch->observations);
+  append(record.actions, &batch->actions);
+  append(record.rewards, &batch->rewards);
+  append(record.final_observation, &batch->final_observations);
+  batch->episodes.push_back({begin, batch->size(), record.terminated});
+}
+
 }  // namespace
 
 /// Plays one episode at a time, in its own simulation.
@@ -195,38 +229,12 @@ Batch RolloutSampler::Collect(const GaussianPolicy& policy, const ParameterSampl
       records.push_back(std::move(record));
     }
     batch.played += wanted;
-    // A session has let in distributions of which half of a sample can be simulated: of a few
-    // episodes most may break, and nothing that was let in is to end a trainer.
-    if (10 * batch.dropped > 9 * batch.played && batch.played >= kFewestJudged) {
-      throw std::runtime_error(
-          fmt::format("{} of {} simulated episodes were not finite or had impossible parameters: "
-                      "nothing to learn from",
-                      batch.dropped, batch.played));
-    }
-    kept.resize(records.size());
-    std::iota(kept.begin(), kept.end(), 0);
-    if (worst_share < 1) {
-      std::stable_sort(kept.begin(), kept.end(),
-                       [&](size_t a, size_t b) { return records[a].sum < records[b].sum; });
-      kept.resize(
-          static_cast<size_t>(std::ceil(worst_share * static_cast<double>(records.size()))));
-      std::sort(kept.begin(), kept.end());
-    }
+    RequireUsable(batch);
+    kept = Worst(records, worst_share);
     kept_steps = 0;
     for (const size_t i : kept) kept_steps += records[i].steps();
   }
-  for (const size_t i : kept) {
-    const EpisodeRecord& record = records[i];
-    const int begin = batch.size();
-    batch.observations.insert(batch.observations.end(), record.observations.begin(),
-                              record.observations.end());
-    batch.actions.insert(batch.actions.end(), record.actions.begin(), record.actions.end());
-    batch.rewards.insert(batch.rewards.end(), record.rewards.begin(), record.rewards.end());
-    batch.final_observations.insert(batch.final_observations.end(),
-                                    record.final_observation.begin(),
-                                    record.final_observation.end());
-    batch.episodes.push_back({begin, batch.size(), record.terminated});
-  }
+  for (const size_t i : kept) Append(records[i], &batch);
   batch.mean_return = sum / static_cast<double>(records.size());
   return batch;
 }

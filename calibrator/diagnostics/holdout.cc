@@ -56,6 +56,57 @@ double LongestStretch(std::span<const Rollout> rollouts) {
   return longest;
 }
 
+// The longest horizon of which there are windows; null = none.
+const HorizonError* Farthest(const std::vector<HorizonError>& errors) {
+  const HorizonError* last = nullptr;
+  for (const HorizonError& error : errors) {
+    if (error.windows > 0) last = &error;
+  }
+  return last;
+}
+
+struct Verdict {
+  bool better = false;  // than the prior at some horizon
+  std::string worse;    // at which ones
+
+  // @param entries of a state that are observed.
+  void Count(const HorizonError& error, double entries) {
+    // A root mean square of so many errors is known that well; where noise is most of it the two
+    // are alike.
+    const double chance = 1 / std::sqrt(2.0 * static_cast<double>(error.windows) * entries);
+    if (error.posterior + kRounding < error.prior * (1 - chance))
+      better = true;
+    else if (!(error.posterior <= error.prior * (1 + chance) + kRounding))  // or not finite
+      worse += fmt::format("{}{}", worse.empty() ? "" : ", ", error.horizon);
+  }
+};
+
+std::string Summarise(const Holdout& result, const Verdict& verdict) {
+  const HorizonError* last = Farthest(result.errors);
+  if (!last) {
+    return "too few transitions to hold any out: whether the posterior predicts better than the "
+           "prior is not known";
+  }
+  if (result.better) {
+    const HorizonError& first = result.errors[0];
+    return fmt::format(
+        "on {} transitions that it has not seen, the posterior predicts better than the prior: "
+        "errors are {:.3g} times the prior's after 1 step, {:.3g} times after {}",
+        result.held_out, first.posterior / first.prior, last->posterior / last->prior,
+        last->horizon);
+  }
+  if (verdict.worse.empty()) {
+    return fmt::format(
+        "on {} transitions that it has not seen, the posterior predicts no better than the prior: "
+        "train with the prior, and record motion that tells more",
+        result.held_out);
+  }
+  return fmt::format(
+      "on {} transitions that it has not seen, the posterior predicts WORSE than the prior {} "
+      "step{} ahead: train with the prior, until the model explains what was recorded",
+      result.held_out, verdict.worse, verdict.worse == "1" ? "" : "s");
+}
+
 }  // namespace
 
 Split HoldOut(std::span<const Rollout> rollouts) {
@@ -92,54 +143,18 @@ Holdout Judge(Discrepancy& discrepancy, const Split& split, const Eigen::VectorX
     const Eigen::VectorXd replayed = discrepancy.ReplayError(both, split.held_out);
     result.replay = {replayed(0), replayed(1), LongestStretch(split.held_out)};
   }
-  int tried = 0, better = 0;
-  std::string worse, alike;
+  Verdict verdict;
   for (const int horizon : kHorizons) {
     HorizonError error{horizon, CountWindows(split.held_out, horizon), NAN, NAN, NAN};
     if (error.windows > 0) {
       const Eigen::VectorXd errors = discrepancy.PredictionError(both, split.held_out, horizon);
       error.posterior = errors(0), error.prior = errors(1);
-      ++tried;
-      // A root mean square of so many errors is known that well; where noise is most of it the two
-      // are alike.
-      const double chance = 1 / std::sqrt(2.0 * static_cast<double>(error.windows) * entries);
-      if (error.posterior + kRounding < error.prior * (1 - chance))
-        ++better;
-      else if (error.posterior <= error.prior * (1 + chance) + kRounding)
-        alike += fmt::format("{}{}", alike.empty() ? "" : ", ", horizon);
-      else
-        worse += fmt::format("{}{}", worse.empty() ? "" : ", ", horizon);
+      verdict.Count(error, entries);
     }
     result.errors.push_back(error);
   }
-  result.better = better > 0 && worse.empty();
-  if (tried == 0) {
-    result.summary =
-        "too few transitions to hold any out: whether the posterior predicts better than the prior "
-        "is not known";
-  } else if (result.better) {
-    const HorizonError* last = nullptr;
-    for (const HorizonError& error : result.errors) {
-      if (error.windows > 0) last = &error;
-    }
-    result.summary = fmt::format(
-        "on {} transitions that it has not seen, the posterior predicts better than the prior: "
-        "errors are {:.3g} times "
-        "the prior's after 1 step, {:.3g} times after {}",
-        result.held_out, result.errors[0].posterior / result.errors[0].prior,
-        last->posterior / last->prior, last->horizon);
-  } else if (worse.empty()) {
-    result.summary = fmt::format(
-        "on {} transitions that it has not seen, the posterior predicts no better than the prior: "
-        "train with the prior, and record motion that tells more",
-        result.held_out);
-  } else {
-    result.summary = fmt::format(
-        "on {} transitions that it has not seen, the posterior predicts WORSE than the prior {} "
-        "step{} "
-        "ahead: train with the prior, until the model explains what was recorded",
-        result.held_out, worse, worse == "1" ? "" : "s");
-  }
+  result.better = verdict.better && verdict.worse.empty();
+  result.summary = Summarise(result, verdict);
   return result;
 }
 
@@ -147,11 +162,9 @@ void JudgeResidual(const std::shared_ptr<const Model>& model, const Residual& re
                    const Split& split, const Eigen::VectorXd& posterior, Holdout* holdout) {
   const Eigen::VectorXd errors =
       CorrectedPredictionErrors(model, posterior, residual, split.held_out, kHorizons);
-  const HorizonError* last = nullptr;
-  for (size_t i = 0; i < holdout->errors.size(); ++i) {
+  for (size_t i = 0; i < holdout->errors.size(); ++i)
     holdout->errors[i].corrected = errors[static_cast<Eigen::Index>(i)];
-    if (holdout->errors[i].windows > 0) last = &holdout->errors[i];
-  }
+  const HorizonError* last = Farthest(holdout->errors);
   if (!last) return;
   const auto ratio = [](const HorizonError& error) { return error.corrected / error.posterior; };
   holdout->summary += fmt::format(

@@ -50,6 +50,24 @@ Eigen::MatrixXd RangeBasis(const Eigen::MatrixXd& jacobian) {
   return FirstColumns(qr.householderQ(), qr.rank());
 }
 
+// Steps that touch what.
+struct Touching {
+  int any = 0, ground = 0, stop = 0, links = 0;
+
+  void Count(const Touch& touch) {
+    any += touch.any();
+    ground += touch.ground;
+    stop += touch.stop;
+    links += touch.links;
+  }
+  const char* InWords() const {
+    if (ground >= kMostOf * any) return "at ground contact";
+    if (stop >= kMostOf * any) return "at a stop";
+    return links > 0 ? "in contact with the ground, a stop or another link"
+                     : "in contact with the ground or a stop";
+  }
+};
+
 bool SameReading(const Transition& a, const Transition& b) {
   return a.next_q.allFinite() && a.next_v.allFinite() && a.next_q == b.q && a.next_v == b.v;
 }
@@ -72,7 +90,7 @@ ProjectedErrors::ProjectedErrors(const RobotDescription& robot, const FitResidua
   if (!residuals.where.empty() && residuals.where.size() != index.size())
     throw std::invalid_argument("it is not known of each transition where it was");
   TouchFinder finder(robot);
-  int ground = 0, stop = 0, links = 0;
+  Touching touching;
   for (auto& [key, number] : index) {
     number = static_cast<int>(steps.size());
     const auto& transitions = residuals.rollouts[static_cast<size_t>(key.first)].transitions;
@@ -83,9 +101,7 @@ ProjectedErrors::ProjectedErrors(const RobotDescription& robot, const FitResidua
       q = where.q, v = where.v, next_q = where.next_q;
     }
     const Touch touch = finder.OfStep(q, next_q);
-    ground += touch.ground;
-    stop += touch.stop;
-    links += touch.links;
+    touching.Count(touch);
     steps.push_back({&transition, std::move(q), std::move(v), touch.any(), -1, false,
                      std::vector<Eigen::Index>(static_cast<size_t>(2 * n), -1)});
     const auto before = index.find({key.first, key.second - 1});
@@ -95,14 +111,8 @@ ProjectedErrors::ProjectedErrors(const RobotDescription& robot, const FitResidua
     last.next = number;
     last.shares_state = !Exact(transition) && SameReading(*last.transition, transition);
   }
-  const auto touching =
-      std::count_if(steps.begin(), steps.end(), [](const Step& step) { return step.contact; });
-  contact_words =
-      static_cast<double>(ground) >= kMostOf * static_cast<double>(touching) ? "at ground contact"
-      : static_cast<double>(stop) >= kMostOf * static_cast<double>(touching) ? "at a stop"
-      : links > 0 ? "in contact with the ground, a stop or another link"
-                  : "in contact with the ground or a stop";
-  conditions = touching >= kFewest && static_cast<int>(steps.size()) - touching >= kFewest;
+  contact_words = touching.InWords();
+  conditions = touching.any >= kFewest && static_cast<int>(steps.size()) - touching.any >= kFewest;
   for (size_t i = 0; i < residuals.rows.size(); ++i) {
     const WindowErrors::Row& row = residuals.rows[i];
     step_of.push_back(index.at({row.rollout, row.transition}));

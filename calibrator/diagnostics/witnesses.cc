@@ -63,10 +63,15 @@ Eigen::MatrixXd StartSds(const OneStep& step, const Eigen::VectorXd& noise_sd) {
   return sds;
 }
 
-}  // namespace
+// How the end of each transition depends on its beginning, in standard deviations of the
+// beginning's noise.
+struct Expansion {
+  Eigen::Index pairs;  // of points
+  std::vector<Eigen::MatrixXd> slope;
+  std::vector<Eigen::MatrixXd> bend;  // a column for each pair
+};
 
-Witnesses::Witnesses(OneStep& step, std::span<const WindowErrors::Row> rows,
-                     const Eigen::VectorXd& physical, const Eigen::VectorXd& noise_sd) {
+Expansion Expand(OneStep& step, const Eigen::VectorXd& physical, const Eigen::VectorXd& noise_sd) {
   const Eigen::Index size = noise_sd.size();
   const auto count = static_cast<Eigen::Index>(step.steps().size());
   const auto turns = static_cast<int>((kFewestPairs + size - 1) / size);
@@ -76,7 +81,6 @@ Witnesses::Witnesses(OneStep& step, std::span<const WindowErrors::Row> rows,
   directions.reserve(step.steps().size());
   for (Eigen::Index k = 0; k < count; ++k) directions.push_back(Directions(size, turns, k));
   const Eigen::Index pairs = size * turns;
-  // Of each transition: by its noise whitened, and the bend of each pair.
   std::vector<Eigen::MatrixXd> slope(step.steps().size(), Eigen::MatrixXd::Zero(size, size)),
       bend(step.steps().size(), Eigen::MatrixXd(size, pairs));
   for (Eigen::Index pair = 0; pair < pairs; ++pair) {
@@ -92,6 +96,15 @@ Witnesses::Witnesses(OneStep& step, std::span<const WindowErrors::Row> rows,
       bend[at].col(pair) = (above.col(k) + below.col(k)) / 2 - middle.col(k);
     }
   }
+  return {pairs, std::move(slope), std::move(bend)};
+}
+
+}  // namespace
+
+Witnesses::Witnesses(OneStep& step, std::span<const WindowErrors::Row> rows,
+                     const Eigen::VectorXd& physical, const Eigen::VectorXd& noise_sd) {
+  const Expansion near = Expand(step, physical, noise_sd);
+  const Eigen::Index size = noise_sd.size();
   const Index index = IndexOf(step);
   for (const auto& [first, end] : BlocksOf(rows)) {
     const Eigen::Index k = index.at({rows[first].rollout, rows[first].transition});
@@ -99,22 +112,22 @@ Witnesses::Witnesses(OneStep& step, std::span<const WindowErrors::Row> rows,
     const auto height = static_cast<Eigen::Index>(end - first);
     Block block{static_cast<Eigen::Index>(first), height, Eigen::MatrixXd(height, size),
                 Eigen::VectorXd::Ones(size), Eigen::VectorXd(height)};
-    Eigen::MatrixXd bends(height, pairs);
+    Eigen::MatrixXd bends(height, near.pairs);
     std::vector<int> coordinates;
     for (Eigen::Index i = 0; i < height; ++i) {
       const int c = rows[first + static_cast<size_t>(i)].coordinate;
       coordinates.push_back(c);
       const double sd = EndSd(recorded, c);
       block.end_sd(i) = sd > 0 ? sd : noise_sd(c);
-      block.sensitivity.row(i) = slope[static_cast<size_t>(k)].row(c);
-      bends.row(i) = bend[static_cast<size_t>(k)].row(c);
+      block.sensitivity.row(i) = near.slope[static_cast<size_t>(k)].row(c);
+      bends.row(i) = near.bend[static_cast<size_t>(k)].row(c);
     }
     if (!block.sensitivity.allFinite() || !bends.allFinite()) continue;
     AddDisturbance(recorded, coordinates, &block.start_sd, &block.sensitivity);
     const std::vector<Eigen::Index> steps{0, height};
     WhitenWindow(steps, block.start_sd, block.sensitivity, block.end_sd, bends);
     if (bends.rowwise().squaredNorm().maxCoeff() >
-        kLargestBend * kLargestBend * static_cast<double>(pairs)) {
+        kLargestBend * kLargestBend * static_cast<double>(near.pairs)) {
       continue;
     }
     blocks_.push_back(std::move(block));

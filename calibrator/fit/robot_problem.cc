@@ -34,50 +34,46 @@ Eigen::MatrixXd AsSet(const LeastSquares& problem, Eigen::Index dimension,
   return set;
 }
 
-}  // namespace
-
-const std::vector<std::string>& RobotDiscrepancies() {
-  static const std::vector<std::string> names{"likelihood", "squared", "absolute",
-                                              "energy",     "mmd",     "sliced-wasserstein"};
-  return names;
+// The errors' projection on what the parameters do to them, as the likelihood weighs them.
+Problem ByLikelihood(const std::shared_ptr<const LeastSquares>& problem, const LaplaceFit& first,
+                     uint64_t seed) {
+  const Eigen::Index n = problem->prior.size();
+  const Eigen::VectorXd scale = first.scale;
+  const Eigen::MatrixXd slopes = first.jacobian;
+  const Eigen::VectorXd sd = (problem->prior.FromStandard(Eigen::VectorXd::Ones(n)) -
+                              problem->prior.FromStandard(-Eigen::VectorXd::Ones(n))) /
+                             2;
+  Eigen::MatrixXd spread = slopes.transpose() * slopes;
+  spread.diagonal() += sd.array().square().inverse().matrix();
+  const Eigen::MatrixXd project = spread.llt().matrixL().solve(slopes.transpose());
+  return {problem->prior, Eigen::VectorXd::Zero(n),
+          [=](const Eigen::MatrixXd& parameters, int64_t index) -> Eigen::MatrixXd {
+            Eigen::MatrixXd simulated = Scaled(*problem, scale, parameters);
+            for (Eigen::Index j = 0; j < simulated.cols(); ++j) {
+              Random random = NoiseOf(seed, index + j);
+              for (double& e : simulated.col(j)) e += random.Normal();
+            }
+            return project * simulated;
+          }};
 }
 
-Problem RobotProblem(const RobotDescription& robot, WindowErrors& errors, const LaplaceFit& first,
-                     const std::string& discrepancy, uint64_t seed) {
-  const auto problem = std::make_shared<LeastSquares>(ProblemOf(robot, errors));
-  const Eigen::VectorXd scale = first.scale;
-  const Eigen::Index n = problem->prior.size(),
-                     rows = static_cast<Eigen::Index>(problem->group.size());
-  if (discrepancy == "likelihood") {
-    const Eigen::MatrixXd slopes = first.jacobian;
-    const Eigen::VectorXd sd = (problem->prior.FromStandard(Eigen::VectorXd::Ones(n)) -
-                                problem->prior.FromStandard(-Eigen::VectorXd::Ones(n))) /
-                               2;
-    Eigen::MatrixXd spread = slopes.transpose() * slopes;
-    spread.diagonal() += sd.array().square().inverse().matrix();
-    const Eigen::MatrixXd project = spread.llt().matrixL().solve(slopes.transpose());
-    return {problem->prior, Eigen::VectorXd::Zero(n),
-            [=](const Eigen::MatrixXd& parameters, int64_t index) -> Eigen::MatrixXd {
-              Eigen::MatrixXd simulated = Scaled(*problem, scale, parameters);
-              for (Eigen::Index j = 0; j < simulated.cols(); ++j) {
-                Random random = NoiseOf(seed, index + j);
-                for (double& e : simulated.col(j)) e += random.Normal();
-              }
-              return project * simulated;
-            }};
-  }
-  if (discrepancy == "squared" || discrepancy == "absolute") {
-    const bool squared = discrepancy == "squared";
-    return {problem->prior, Eigen::VectorXd::Zero(1),
-            [=](const Eigen::MatrixXd& parameters, int64_t) -> Eigen::MatrixXd {
-              const Eigen::MatrixXd simulated = Scaled(*problem, scale, parameters);
-              if (squared) return simulated.cwiseAbs2().colwise().mean();
-              return simulated.cwiseAbs().colwise().mean();
-            }};
-  }
+// The mean of all errors' squares or absolute values.
+Problem ByMean(const std::shared_ptr<const LeastSquares>& problem, const Eigen::VectorXd& scale,
+               bool squared) {
+  return {problem->prior, Eigen::VectorXd::Zero(1),
+          [=](const Eigen::MatrixXd& parameters, int64_t) -> Eigen::MatrixXd {
+            const Eigen::MatrixXd simulated = Scaled(*problem, scale, parameters);
+            if (squared) return simulated.cwiseAbs2().colwise().mean();
+            return simulated.cwiseAbs().colwise().mean();
+          }};
+}
+
+// The distance of the errors' distribution from that of noise.
+Problem ByDistance(const std::shared_ptr<const LeastSquares>& problem, const Eigen::VectorXd& scale,
+                   Eigen::Index dimension, const std::string& discrepancy, uint64_t seed) {
   // Errors as they would be if they were noise alone: the same for all simulators.
   Random random = NoiseOf(seed, -1);
-  const Eigen::Index dimension = Eigen::Index{2} * errors.num_velocities();
+  const auto rows = static_cast<Eigen::Index>(problem->group.size());
   const SetDistance distance =
       MakeDistance(discrepancy, AsSet(*problem, dimension, StandardNormals(rows, 1, random)), seed);
   return {problem->prior, Eigen::VectorXd::Zero(1),
@@ -92,6 +88,24 @@ Problem RobotProblem(const RobotDescription& robot, WindowErrors& errors, const 
             }
             return distances;
           }};
+}
+
+}  // namespace
+
+const std::vector<std::string>& RobotDiscrepancies() {
+  static const std::vector<std::string> names{"likelihood", "squared", "absolute",
+                                              "energy",     "mmd",     "sliced-wasserstein"};
+  return names;
+}
+
+Problem RobotProblem(const RobotDescription& robot, WindowErrors& errors, const LaplaceFit& first,
+                     const std::string& discrepancy, uint64_t seed) {
+  const auto problem = std::make_shared<const LeastSquares>(ProblemOf(robot, errors));
+  if (discrepancy == "likelihood") return ByLikelihood(problem, first, seed);
+  if (discrepancy == "squared" || discrepancy == "absolute")
+    return ByMean(problem, first.scale, discrepancy == "squared");
+  const Eigen::Index dimension = Eigen::Index{2} * errors.num_velocities();
+  return ByDistance(problem, first.scale, dimension, discrepancy, seed);
 }
 
 }  // namespace plumb

@@ -11,11 +11,9 @@
 #include "calibrator/fit/methods.h"
 #include "calibrator/fit/robot_draws.h"
 #include "calibrator/fit/robot_least_squares.h"
-#include "calibrator/gap/disturbances.h"
 #include "calibrator/inference/gaussian_mixture.h"
 #include "robot/parameter_distribution.h"
 #include "sim/tasks/task.h"
-#include "sim/touch.h"
 
 namespace plumb {
 namespace {
@@ -91,10 +89,15 @@ std::string InWords(const char* where, const ResidualQuality& quality) {
                      where, 100 * MeanExplained(quality));
 }
 
-std::string Unexplained(bool free, bool touching, Informed by) {
-  const char* what = !free      ? "does not explain contact"
-                     : touching ? "explains neither free motion nor contact"
-                                : "does not explain the motion";
+// In which steps the model does not explain what was recorded.
+struct Lacking {
+  bool free, touching;
+};
+
+std::string Unexplained(const Lacking& lacking, Informed by) {
+  const char* what = !lacking.free      ? "does not explain contact"
+                     : lacking.touching ? "explains neither free motion nor contact"
+                                        : "does not explain the motion";
   const char* informed = by == Informed::kNone ? "nothing informs its parameters"
                          : by == Informed::kFree
                              ? "its parameters are learnt from free motion alone"
@@ -179,44 +182,40 @@ bool LearnBesideContacts(const MethodInput& input, GapFit* fit) {
   }
 }
 
+// The method on those steps that the model explains; the prior where there are none.
+Lacking LearnFromExplained(const MethodInput& input, GapFit* fit) {
+  const std::vector<Rollout> steps = FreeSteps(input.model->description(), input.rollouts);
+  const size_t free_count = CountTransitions(steps);
+  const bool touching = free_count < CountTransitions(input.rollouts),
+             enough = free_count >= static_cast<size_t>(kFewestFree);
+  const bool explained =
+      touching && enough &&
+      LearnFrom({input.model, steps, input.options, input.start}, Contacts::kLearnt, fit);
+  // of too few free steps nothing is known
+  const bool free = !touching || (enough && !explained);
+  const bool beside = touching && !free && LearnBesideContacts(input, fit);
+  fit->gap.informed = beside      ? Informed::kBesideContacts
+                      : explained ? Informed::kFree
+                                  : Informed::kNone;
+  if (fit->gap.informed == Informed::kNone) {
+    fit->result = PriorAlone(input, std::move(fit->result));
+    fit->information.setZero();
+  }
+  return {free, touching};
+}
+
+void LearnResidual(const MethodInput& input, const Lacking& lacking, GapFit* fit) {
+  ResidualFitOptions options;
+  options.free = lacking.free, options.touching = lacking.touching;
+  options.seed = input.options.seed;
+  ResidualFit residual =
+      FitResidual(input.model, Draws(input, fit->result.posterior), input.rollouts, options);
+  fit->gap.free = residual.free, fit->gap.touching = residual.touching;
+  if (residual.residual.free || residual.residual.touching)
+    fit->gap.residual = std::make_shared<const Residual>(std::move(residual.residual));
+}
+
 }  // namespace
-
-std::vector<Rollout> FreeSteps(const RobotDescription& robot, std::span<const Rollout> rollouts) {
-  TouchFinder touch(robot, Residual::kTouchMargin);
-  std::vector<Rollout> free(rollouts.begin(), rollouts.end());
-  for (Rollout& rollout : free) {
-    std::erase_if(rollout.transitions,
-                  [&](const Transition& t) { return touch.OfStep(t.q, t.next_q).any(); });
-  }
-  return free;
-}
-
-std::vector<Rollout> InformingSteps(const std::shared_ptr<const Model>& model,
-                                    const Eigen::VectorXd& coordinates,
-                                    std::span<const Rollout> rollouts, Informed informed) {
-  const RobotDescription& robot = model->description();
-  switch (informed) {
-    case Informed::kFree:
-      return FreeSteps(robot, rollouts);
-    case Informed::kBesideContacts:
-      return DisturbedByContacts(model, robot.ToPhysical(coordinates), rollouts);
-    default:
-      return {rollouts.begin(), rollouts.end()};
-  }
-}
-
-const char* Name(Informed informed) {
-  switch (informed) {
-    case Informed::kFree:
-      return "free";
-    case Informed::kBesideContacts:
-      return "beside contacts";
-    case Informed::kNone:
-      return "none";
-    default:
-      return "all";
-  }
-}
 
 Eigen::VectorXd Explained(const ResidualQuality& quality) {
   const Eigen::ArrayXd before = quality.before.array().square(),
@@ -260,32 +259,9 @@ GapFit CloseGap(const MethodInput& input, MethodResult all, const std::string& n
     Take(input, test.considered, &fit);
     return fit;
   }
-  const std::vector<Rollout> steps = FreeSteps(input.model->description(), input.rollouts);
-  const size_t free_count = CountTransitions(steps);
-  const bool touching = free_count < CountTransitions(input.rollouts),
-             enough = free_count >= static_cast<size_t>(kFewestFree);
-  const bool explained =
-      touching && enough &&
-      LearnFrom({input.model, steps, input.options, input.start}, Contacts::kLearnt, &fit);
-  // of too few free steps nothing is known
-  const bool free = !touching || (enough && !explained);
-  const bool beside = touching && !free && LearnBesideContacts(input, &fit);
-  fit.gap.informed = beside      ? Informed::kBesideContacts
-                     : explained ? Informed::kFree
-                                 : Informed::kNone;
-  if (fit.gap.informed == Informed::kNone) {
-    fit.result = PriorAlone(input, std::move(fit.result));
-    fit.information.setZero();
-  }
-  ResidualFitOptions options;
-  options.free = free, options.touching = touching;
-  options.seed = input.options.seed;
-  ResidualFit residual =
-      FitResidual(input.model, Draws(input, fit.result.posterior), input.rollouts, options);
-  fit.gap.free = residual.free, fit.gap.touching = residual.touching;
-  if (residual.residual.free || residual.residual.touching)
-    fit.gap.residual = std::make_shared<const Residual>(std::move(residual.residual));
-  fit.gap.unexplained = Unexplained(free, touching, fit.gap.informed);
+  const Lacking lacking = LearnFromExplained(input, &fit);
+  LearnResidual(input, lacking, &fit);
+  fit.gap.unexplained = Unexplained(lacking, fit.gap.informed);
   fit.gap.summary = Summarise(fit.gap);
   return fit;
 }

@@ -2,31 +2,16 @@
 
 #include <cstdint>
 #include <memory>
-#include <span>
 #include <string>
-#include <vector>
 
 #include "calibrator/diagnostics/misspecification.h"
 #include "calibrator/diagnostics/model_test.h"
 #include "calibrator/fit/method.h"
 #include "calibrator/fit/residual_fit.h"
+#include "calibrator/gap/informing_steps.h"
 #include "robot/residual.h"
 
 namespace plumb {
-
-/// Which steps the parameters are learnt from.
-enum class Informed {
-  kAll,
-  kBesideContacts,  ///< all, but for what contacts may have done (DisturbedByContacts)
-  kFree,            ///< those that touch nothing
-  kNone
-};
-inline constexpr Informed kAllInformed[] = {Informed::kAll, Informed::kBesideContacts,
-                                            Informed::kFree, Informed::kNone};
-/// "all", "beside contacts", "free" or "none".
-const char* Name(Informed informed);
-/// Why, where it is none.
-inline constexpr char kNotInformed[] = "nothing that was recorded is explained well enough to tell";
 
 /// What a model lacks, as far as it was learnt.
 struct Gap {
@@ -82,14 +67,6 @@ GapFit CloseGap(const MethodInput& input, MethodResult all, const std::string& n
 /// Takes the residual, of which there is one, out of what is known of a gap, and says why.
 /// Thread-safe.
 void LeaveOut(const std::string& why, Gap* gap);
-
-/// The steps of roll-outs that begin and end away from the ground and from stops. Thread-safe.
-std::vector<Rollout> FreeSteps(const RobotDescription& robot, std::span<const Rollout> rollouts);
-/// The steps that the parameters are learnt from, or would be if anything informed them.
-/// Thread-safe. @param coordinates of the posterior's mean.
-std::vector<Rollout> InformingSteps(const std::shared_ptr<const Model>& model,
-                                    const Eigen::VectorXd& coordinates,
-                                    std::span<const Rollout> rollouts, Informed informed);
 
 /// Share of each velocity's squared errors that a residual explains, left-out transitions judging:
 /// 0 to 1; empty where none was learnt. Thread-safe.

@@ -170,6 +170,41 @@ json Interval(const Summary& summary) {
   return interval;
 }
 
+json PriorJson(const Gaussian& prior, const Summary& summary) {
+  const Eigen::VectorXd coordinate_sd = prior.covariance.diagonal().cwiseSqrt();
+  return {{"mean", ToJson(summary.prior_mean)},
+          {"sd", ToJson(summary.prior_sd)},
+          {"coordinate_mean", ToJson(prior.mean)},
+          {"coordinate_sd", ToJson(coordinate_sd)},
+          {"coordinate_covariance", ToJson(prior.covariance)}};
+}
+
+json StartJson(const Eigen::VectorXd& start) {
+  json list = json::array();
+  for (const double number : start) list.push_back(ShortestSingle(number));
+  return list;
+}
+
+json Versions() {
+  return {{"plumbline", VersionLine("plumb")},
+          {"eigen",
+           fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
+          {"compiler", __VERSION__}};
+}
+
+json RunJson(const Findings& findings, const Provenance& provenance) {
+  return {
+      {"seconds", findings.seconds}, {"date", provenance.date}, {"command", provenance.command}};
+}
+
+// Of an iteration of the loop, what is not looked into there is null.
+void AddLoop(const LoopUpdate& loop, json* j) {
+  for (const char* unknown : {"check", "alarm", "gap", "advice", "holdout", "agreement", "noise_sd",
+                              "simulations", "stages"})
+    (*j)[unknown] = nullptr;
+  (*j)["loop"] = ToJson(loop);
+}
+
 }  // namespace
 
 Provenance ProvenanceOf(std::span<const Log> logs, const CalibrationOptions& options,
@@ -192,7 +227,6 @@ std::string PosteriorJson(const Findings& findings, const RobotDescription& robo
   std::vector<std::string> names;
   names.reserve(parameters.size());
   for (const ParameterDescription& p : parameters) names.push_back(p.name);
-  const Eigen::VectorXd coordinate_sd = findings.prior.covariance.diagonal().cwiseSqrt();
   json j{{"format", kPosteriorFormat},
          {"version", kPosteriorVersion},
          {"robot", robot.name},
@@ -205,12 +239,7 @@ std::string PosteriorJson(const Findings& findings, const RobotDescription& robo
          {"names", names},
          {"units", List(parameters, [](const ParameterDescription& p) { return p.unit; })},
          {"coordinates", List(parameters, [](const ParameterDescription& p) { return ToJson(p); })},
-         {"prior",
-          {{"mean", ToJson(summary.prior_mean)},
-           {"sd", ToJson(summary.prior_sd)},
-           {"coordinate_mean", ToJson(findings.prior.mean)},
-           {"coordinate_sd", ToJson(coordinate_sd)},
-           {"coordinate_covariance", ToJson(findings.prior.covariance)}}},
+         {"prior", PriorJson(findings.prior, summary)},
          {"mean", ToJson(summary.mean)},
          {"sd", ToJson(summary.sd)},
          {"interval_95", Interval(summary)},
@@ -236,27 +265,10 @@ std::string PosteriorJson(const Findings& findings, const RobotDescription& robo
          {"warnings", findings.warnings},
          {"samples", Samples(summary.samples)},
          {"residual", findings.gap.residual ? ResidualJson(*findings.gap.residual) : json()},
-         {"starts", List(findings.starts,
-                         [](const Eigen::VectorXd& start) {
-                           json list = json::array();
-                           for (const double number : start) list.push_back(ShortestSingle(number));
-                           return list;
-                         })},
-         {"versions",
-          {{"plumbline", VersionLine("plumb")},
-           {"eigen",
-            fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
-           {"compiler", __VERSION__}}}};
-  if (findings.loop) {
-    for (const char* unknown : {"check", "alarm", "gap", "advice", "holdout", "agreement",
-                                "noise_sd", "simulations", "stages"})
-      j[unknown] = nullptr;
-    j["loop"] = ToJson(*findings.loop);
-    j["run"] = nullptr;
-  } else {
-    j["run"] = {
-        {"seconds", findings.seconds}, {"date", provenance.date}, {"command", provenance.command}};
-  }
+         {"starts", List(findings.starts, StartJson)},
+         {"versions", Versions()}};
+  if (findings.loop) AddLoop(*findings.loop, &j);
+  j["run"] = findings.loop ? json() : RunJson(findings, provenance);
   return JsonLines(j);
 }
 

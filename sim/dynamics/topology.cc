@@ -66,11 +66,8 @@ Matrix3d PlaneAxes(const Vector3d& normal) {
   return axes;
 }
 
-}  // namespace
-
-Topology::Topology(const RobotDescription& robot) {
-  const size_t n = robot.joints.size();
-  for (size_t i = 0; i < n; ++i) {
+void RequireTree(const RobotDescription& robot) {
+  for (size_t i = 0; i < robot.joints.size(); ++i) {
     const JointDescription& joint = robot.joints[i];
     if (joint.child != static_cast<int>(i) + 1 || joint.parent < 0 ||
         joint.parent > static_cast<int>(i)) {
@@ -78,6 +75,12 @@ Topology::Topology(const RobotDescription& robot) {
                                   "' is not in depth-first order of a tree");
     }
   }
+}
+
+}  // namespace
+
+Topology::Topology(const RobotDescription& robot) {
+  RequireTree(robot);
   link_axes = AxesAtZero(robot);
   for (const ContactPoint& point : ContactPoints(robot)) points.push_back({point.link});
   const Vector3d normal = FindNormal(robot, link_axes);
@@ -89,47 +92,38 @@ Topology::Topology(const RobotDescription& robot) {
     for (Matrix3d& axes : link_axes) axes = world_axes * axes;
   }
   Vector3d::Map(up) = world_axes.col(2);
-
-  std::vector<int> last(n + 1, -1);  // velocity of the link's own joint
-  for (size_t i = 0; i < n; ++i) {
-    const JointDescription& described = robot.joints[i];
-    Joint joint{};
-    joint.type = described.type;
-    joint.parent = described.parent;
-    joint.position = positions;
-    joint.velocity = velocities;
-    Vector3d axis = link_axes[i + 1] * described.axis;
-    if (planar) {  // exactly so
-      if (described.type == Type::kPrismatic) axis.z() = 0;
-      if (described.type != Type::kPrismatic) axis = Vector3d(0, 0, axis.z() > 0 ? 1 : -1);
-    }
-    Vector3d::Map(joint.axis) = axis;
-    Matrix3d::Map(joint.link_axes) = link_axes[i + 1];
-    joint.lower = described.lower;
-    joint.upper = described.upper;
-    joint.effort_limit = described.effort_limit;
-    int ancestor = last[static_cast<size_t>(described.parent)];
-    for (int k = 0; k < described.num_velocities(); ++k) {
-      ancestors.push_back(ancestor);
-      ancestor = velocities + k;
-    }
-    last[i + 1] = ancestor;
-    positions += described.num_positions();
-    velocities += described.num_velocities();
-    coriolis = coriolis || joint.parent != 0 || described.type == Type::kSpherical;
-    joints.push_back(joint);
-  }
+  for (const JointDescription& joint : robot.joints) AddJoint(joint);
   AddPairs(robot, touching);
   FindPattern();
-  // The chain of slides that the robot as a whole hangs on.
-  const auto children = [&](int link) {
-    return std::count_if(joints.begin(), joints.end(),
-                         [link](const Joint& joint) { return joint.parent == link; });
-  };
-  while (anchor < static_cast<int>(n) && children(anchor) == 1 &&
-         joints[static_cast<size_t>(anchor)].type == Type::kPrismatic) {
-    ++anchor;
+  FindAnchor();
+}
+
+void Topology::AddJoint(const JointDescription& described) {
+  Joint joint{};
+  joint.type = described.type;
+  joint.parent = described.parent;
+  joint.position = positions;
+  joint.velocity = velocities;
+  const Matrix3d& axes = link_axes[static_cast<size_t>(described.child)];
+  Vector3d axis = axes * described.axis;
+  if (planar) {  // exactly so
+    if (described.type == Type::kPrismatic) axis.z() = 0;
+    if (described.type != Type::kPrismatic) axis = Vector3d(0, 0, axis.z() > 0 ? 1 : -1);
   }
+  Vector3d::Map(joint.axis) = axis;
+  Matrix3d::Map(joint.link_axes) = axes;
+  joint.lower = described.lower;
+  joint.upper = described.upper;
+  joint.effort_limit = described.effort_limit;
+  int ancestor = LastVelocity(described.parent);
+  for (int k = 0; k < described.num_velocities(); ++k) {
+    ancestors.push_back(ancestor);
+    ancestor = velocities + k;
+  }
+  positions += described.num_positions();
+  velocities += described.num_velocities();
+  coriolis = coriolis || joint.parent != 0 || described.type == Type::kSpherical;
+  joints.push_back(joint);
 }
 
 void Topology::AddPairs(const RobotDescription& robot, const ContactPairs& touching) {
@@ -177,6 +171,18 @@ void Topology::FindPattern() {
       const auto at = static_cast<size_t>(j);
       if (filled[k][at]) filled[static_cast<size_t>(pattern[k])][at] = true;
     }
+  }
+}
+
+// The chain of slides that the robot as a whole hangs on.
+void Topology::FindAnchor() {
+  const auto children = [&](int link) {
+    return std::count_if(joints.begin(), joints.end(),
+                         [link](const Joint& joint) { return joint.parent == link; });
+  };
+  while (anchor < static_cast<int>(joints.size()) && children(anchor) == 1 &&
+         joints[static_cast<size_t>(anchor)].type == Type::kPrismatic) {
+    ++anchor;
   }
 }
 

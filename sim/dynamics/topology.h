@@ -80,8 +80,10 @@ struct Topology {
   explicit Topology(const RobotDescription& description);
 
  private:
+  void AddJoint(const JointDescription& described);
   void AddPairs(const RobotDescription& robot, const ContactPairs& touching);
   void FindPattern();
+  void FindAnchor();
 };
 
 }  // namespace plumb

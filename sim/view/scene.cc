@@ -103,51 +103,55 @@ std::vector<Silhouette> Scene::Look(const Eigen::Ref<const Eigen::VectorXd>& q) 
     for (const Shape& shape : shapes_[link]) {
       const Eigen::Matrix3d axes = poses[link].rotation * shape.rotation;
       const Eigen::Vector3d center = poses[link].position + poses[link].rotation * shape.position;
-      std::vector<Eigen::Vector2d> points;
-      const auto add_ball = [&](const Eigen::Vector3d& at, double radius) {
-        for (int i = 0; i < kCirclePoints; ++i) {
-          const double angle = 2 * std::numbers::pi * i / kCirclePoints;
-          points.push_back(Project(at) +
-                           radius * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
-        }
-      };
-      const Eigen::Vector3d half_axis = axes.col(2) * shape.size[1] / 2;
-      switch (shape.type) {
-        case Shape::Type::kSphere:
-          add_ball(center, shape.size[0]);
-          break;
-        case Shape::Type::kCapsule:
-          add_ball(center + half_axis, shape.size[0]);
-          add_ball(center - half_axis, shape.size[0]);
-          break;
-        case Shape::Type::kCylinder:
-          for (int i = 0; i < kCirclePoints; ++i) {
-            const double angle = 2 * std::numbers::pi * i / kCirclePoints;
-            const Eigen::Vector3d rim =
-                shape.size[0] * (std::cos(angle) * axes.col(0) + std::sin(angle) * axes.col(1));
-            points.push_back(Project(center + half_axis + rim));
-            points.push_back(Project(center - half_axis + rim));
-          }
-          break;
-        case Shape::Type::kBox:
-          for (int corner = 0; corner < 8; ++corner) {
-            const Eigen::Vector3d sign(corner & 1 ? 0.5 : -0.5, corner & 2 ? 0.5 : -0.5,
-                                       corner & 4 ? 0.5 : -0.5);
-            points.push_back(Project(center + axes * shape.size.cwiseProduct(sign)));
-          }
-          break;
-        case Shape::Type::kMesh:  // is a box here
-          break;
-      }
       // x to the right is seen from -y, y to the right from +x.
       const double depth = across_ == 0 ? center.y() : -center.x();
-      silhouettes.push_back({static_cast<int>(link), depth, ConvexHull(std::move(points))});
+      silhouettes.push_back({static_cast<int>(link), depth, Outline(shape, center, axes)});
     }
   }
   std::stable_sort(
       silhouettes.begin(), silhouettes.end(),
       [](const Silhouette& a, const Silhouette& b) { return a.depth > b.depth + 1e-9; });
   return silhouettes;
+}
+
+std::vector<Eigen::Vector2d> Scene::Outline(const Shape& shape, const Eigen::Vector3d& center,
+                                            const Eigen::Matrix3d& axes) const {
+  std::vector<Eigen::Vector2d> points;
+  const auto add_ball = [&](const Eigen::Vector3d& at, double radius) {
+    for (int i = 0; i < kCirclePoints; ++i) {
+      const double angle = 2 * std::numbers::pi * i / kCirclePoints;
+      points.push_back(Project(at) + radius * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
+    }
+  };
+  const Eigen::Vector3d half_axis = axes.col(2) * shape.size[1] / 2;
+  switch (shape.type) {
+    case Shape::Type::kSphere:
+      add_ball(center, shape.size[0]);
+      break;
+    case Shape::Type::kCapsule:
+      add_ball(center + half_axis, shape.size[0]);
+      add_ball(center - half_axis, shape.size[0]);
+      break;
+    case Shape::Type::kCylinder:
+      for (int i = 0; i < kCirclePoints; ++i) {
+        const double angle = 2 * std::numbers::pi * i / kCirclePoints;
+        const Eigen::Vector3d rim =
+            shape.size[0] * (std::cos(angle) * axes.col(0) + std::sin(angle) * axes.col(1));
+        points.push_back(Project(center + half_axis + rim));
+        points.push_back(Project(center - half_axis + rim));
+      }
+      break;
+    case Shape::Type::kBox:
+      for (int corner = 0; corner < 8; ++corner) {
+        const Eigen::Vector3d sign(corner & 1 ? 0.5 : -0.5, corner & 2 ? 0.5 : -0.5,
+                                   corner & 4 ? 0.5 : -0.5);
+        points.push_back(Project(center + axes * shape.size.cwiseProduct(sign)));
+      }
+      break;
+    case Shape::Type::kMesh:  // is a box here
+      break;
+  }
+  return ConvexHull(std::move(points));
 }
 
 std::vector<Eigen::Vector2d> Scene::Hinges(const Eigen::Ref<const Eigen::VectorXd>& q) const {

@@ -38,6 +38,8 @@ class Scene {
 
  private:
   Eigen::Vector2d Project(const Eigen::Vector3d& point) const { return {point[across_], point[2]}; }
+  std::vector<Eigen::Vector2d> Outline(const Shape& shape, const Eigen::Vector3d& center,
+                                       const Eigen::Matrix3d& axes) const;
 
   const RobotDescription* robot_;
   int across_;
