@@ -172,7 +172,7 @@ TEST_CASE("numbers that are none are left out of the drawings") {
   findings.misspecification.misfits[0].statistic = INFINITY;
   findings.agreement.logs[0].mean.setConstant(NAN), findings.agreement.logs[1].sd.resize(0);
   findings.cramer_rao.setConstant(NAN), findings.stages[0].discrepancy = NAN;
-  findings.samples = findings.samples.col(0).replicate(1, 50);  // without any width
+  findings.samples = findings.samples.col(0).replicate(1, 50).eval();  // without any width
   Residuals residuals = SampleResiduals(robot);
   residuals.whitened(7) = NAN, residuals.whitened(8) = INFINITY, residuals.whitened(9) = 1e300;
   const std::string html = ReportHtml(findings, robot, SampleProvenance(), residuals);
