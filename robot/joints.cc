@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "common/nearest_name.h"
-#include "common/small_letters.h"
 
 namespace plumb {
 namespace {
@@ -28,13 +27,6 @@ constexpr MotorTable kMotorTables[] = {
     {"rmd", &ReadRmd, &CheckRmd},
 };
 
-// That there is no such protocol is for the drivers to say, who know all of them.
-bool IsMisspelt(const std::string& protocol, const char* table) {
-  if (std::ranges::any_of(kMotorTables, [&](const auto& t) { return protocol == t.protocol; }))
-    return false;
-  return EditDistance(InSmallLetters(protocol), table) <= 2;
-}
-
 MotorDescription ReadMotor(Config& config, const std::vector<BusDescription>& buses) {
   MotorDescription motor;
   motor.protocol = config.String("protocol");
@@ -47,7 +39,7 @@ MotorDescription ReadMotor(Config& config, const std::vector<BusDescription>& bu
   for (const MotorTable& table : kMotorTables) {
     if (motor.protocol == table.protocol) {
       table.read(config, motor);
-    } else if (config.Has(table.protocol) && !IsMisspelt(motor.protocol, table.protocol)) {
+    } else if (config.Has(table.protocol)) {
       config.Fail(table.protocol, fmt::format("is of protocol \"{}\", but the motor's is \"{}\"",
                                               table.protocol, motor.protocol));
     }

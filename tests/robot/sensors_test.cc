@@ -232,11 +232,9 @@ TEST_CASE("moteus: a greatest torque, and a bus that carries CAN FD") {
   };
   refused(moteus.substr(moteus.find("[joint.moteus]")), "", "moteus");
   refused("protocol = \"moteus\"", "protocol = \"cansimple\"", "is of protocol \"moteus\"");
-  // That is for the drivers to refuse.
   for (const std::string misspelt : {"Moteus", "motues"}) {
-    CHECK(load(Replaced(moteus, "protocol = \"moteus\"", "protocol = \"" + misspelt + "\""))
-              .joints[3]
-              .motor.protocol == misspelt);
+    refused("protocol = \"moteus\"", "protocol = \"" + misspelt + "\"",
+            "is of protocol \"moteus\", but the motor's is \"" + misspelt + "\"");
   }
   refused("node = 7", "node = 0", "an id from 1 to 126");
   refused("node = 7", "node = 127", "an id from 1 to 126");
