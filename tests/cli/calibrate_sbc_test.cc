@@ -3,6 +3,7 @@
 #include <string>
 
 #include "tests/cli/shell.h"
+#include "tests/mpirun.h"
 #include "tests/temporary_folder.h"
 
 namespace plumb {
@@ -42,8 +43,8 @@ TEST_CASE(
   CHECK(enough.status == 0);
   CHECK(enough.text.find("calibrated") != std::string::npos);
   CHECK(enough.text.find("unknown") == std::string::npos);
-  if (!HasMpirun()) return;
-  const Outcome ranks = Shell(Mpirun(2) + Plumb() + calibrate + "5");
+  if (!HaveMpirun()) return;
+  const Outcome ranks = Shell(Mpirun(2, Plumb() + calibrate + "5"));
   INFO(ranks.text);
   CHECK(ranks.status == 1);
   const std::string refusal = "--model and --sbc are for one rank";

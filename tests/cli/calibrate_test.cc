@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tests/cli/shell.h"
+#include "tests/mpirun.h"
 #include "tests/temporary_folder.h"
 
 namespace plumb {
@@ -111,25 +112,25 @@ TEST_CASE("a journal is not taken up for a table that has been corrected since")
 }
 
 TEST_CASE("ranks that share the work come to the same bits") {
-  if (!HasMpirun()) return;
+  if (!HaveMpirun()) return;
   const TemporaryFolder folder;
   const std::string table = HopperTable(folder, 6);
   const std::string arguments =
       "calibrate " + Robot("hopper") + " --csv " + table + " --threads 1 --output ";
   REQUIRE(Shell(Plumb() + arguments + (folder / "one.json")).status == 0);
-  const Outcome three = Shell(Mpirun(3) + Plumb() + arguments + (folder / "three.json"));
+  const Outcome three = Shell(Mpirun(3, Plumb() + arguments + (folder / "three.json")));
   INFO(three.text);
   REQUIRE(three.status == 0);
   CHECK(Posterior(folder / "three.json") == Posterior(folder / "one.json"));
 }
 
 TEST_CASE("a rank that is asked to stop does not let the others wait for it") {
-  if (!HasMpirun()) return;
+  if (!HaveMpirun()) return;
   const TemporaryFolder folder;
   const std::string one = Plumb() + "calibrate " + Robot("hopper") + " --csv " +
                           HopperTable(folder, 4) + " --method reps --threads 1 --output " +
                           (folder / "p.json");
-  const Outcome outcome = Shell(Mpirun(1) + one + " : -n 1 env --block-signal=TERM sh -c " +
+  const Outcome outcome = Shell(Mpirun(1, one) + " : -n 1 env --block-signal=TERM sh -c " +
                                 "'kill $$; exec " + one + "'");
   INFO(outcome.text);
   CHECK(outcome.status != 0);

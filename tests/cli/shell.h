@@ -47,19 +47,6 @@ inline Outcome ShellAskedToEnd(const std::string& command) {
   return Shell("exec env --block-signal=TERM sh -c 'kill $$; exec " + command + "'");
 }
 
-/// Whether ranks can be started; where they cannot, the test says that it skips them.
-inline bool HasMpirun() {
-  if (Shell("command -v mpirun").status == 0) return true;
-  WARN("skipped: mpirun is not installed (openmpi-bin, which scripts/setup installs)");
-  return false;
-}
-
-/// In front of a program: starts so many ranks of it.
-inline std::string Mpirun(int ranks) {
-  return "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun --oversubscribe -n " +
-         std::to_string(ranks) + " ";
-}
-
 /// The program under test, with a space behind it, and the robots it comes with.
 inline std::string Plumb() { return std::string(std::getenv("PLUMBLINE_BUILD")) + "/bin/plumb "; }
 inline std::string Robot(const std::string& name) {

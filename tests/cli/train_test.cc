@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "tests/cli/shell.h"
+#include "tests/mpirun.h"
 #include "tests/temporary_folder.h"
 #include "trainer/checkpoint.h"
 #include "trainer/onnx_policy.h"
@@ -210,13 +211,12 @@ TEST_CASE("a training that has not ended is not lost to another one") {
 TEST_CASE("ranks give the same bits as one process, file by file") {
   const TemporaryFolder folder;
   REQUIRE(Shell(Train(folder, "one", "--steps 12000 --threads 2")).status == 0);
-  if (!HasMpirun()) return;
-  const std::string mpirun = Mpirun(3);
-  const Outcome begun = Shell(mpirun + Train(folder, "three", "--steps 6000 --threads 1"));
+  if (!HaveMpirun()) return;
+  const Outcome begun = Shell(Mpirun(3, Train(folder, "three", "--steps 6000 --threads 1")));
   INFO(begun.text);
   REQUIRE(begun.status == 0);
   // from its checkpoint
-  const Outcome outcome = Shell(mpirun + Train(folder, "three", "--steps 12000 --threads 1"));
+  const Outcome outcome = Shell(Mpirun(3, Train(folder, "three", "--steps 12000 --threads 1")));
   INFO(outcome.text);
   REQUIRE(outcome.status == 0);
   CHECK(Read(folder / "three") == Read(folder / "one"));
