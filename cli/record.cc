@@ -47,6 +47,7 @@ int Record(Process& process, const RecordFlags& flags) {
   spdlog::info("recording to {}", flags.log);
   while (process.Wait(1'000'000) && !failure) {
   }
+  messenger.DrainForGood();
   if (failure) std::rethrow_exception(failure);
   log.Flush();
   spdlog::info("{} messages in {}", messages, flags.log);

@@ -92,9 +92,21 @@ LcmReceiver::LcmReceiver(const MulticastAddress& address)
   thread_ = std::thread([this] { Work(); });
 }
 
-LcmReceiver::~LcmReceiver() {
+LcmReceiver::~LcmReceiver() { StopWork(); }
+
+void LcmReceiver::StopWork() {
+  if (!thread_.joinable()) return;
   eventfd_write(stop_fd_.get(), 1);
   thread_.join();
+}
+
+void LcmReceiver::Leave() {
+  // Nothing comes any more, so that there is an end to what is left in the socket.
+  setsockopt(socket_.get(), IPPROTO_IP, IP_DROP_MEMBERSHIP, &membership_, sizeof membership_);
+  StopWork();
+  std::vector<uint8_t> buffer(kMaxDatagram);
+  while (Receive(buffer)) {
+  }
 }
 
 /// Everything that keeps datagrams out comes before the socket has a port.
@@ -113,9 +125,8 @@ void LcmReceiver::Open(const MulticastAddress& address) {
   inet_pton(AF_INET, address.group.c_str(), &group.sin_addr);
   if (bind(fd, reinterpret_cast<const sockaddr*>(&group), sizeof group) != 0)
     FailWithErrno("cannot bind LCM's port");
-  ip_mreqn membership{};
-  membership.imr_multiaddr = group.sin_addr;  // by the interface that the routes choose
-  SetOption(fd, IPPROTO_IP, IP_ADD_MEMBERSHIP, membership, "cannot join LCM's group");
+  membership_.imr_multiaddr = group.sin_addr;  // by the interface that the routes choose
+  SetOption(fd, IPPROTO_IP, IP_ADD_MEMBERSHIP, membership_, "cannot join LCM's group");
 }
 
 LcmReceiver::Queue* LcmReceiver::Listen(const std::string& channel, Handler handler) {
@@ -166,18 +177,20 @@ void LcmReceiver::Work() {
   }
 }
 
-void LcmReceiver::Receive(std::span<uint8_t> buffer) {
+// A burst. False: none is left.
+bool LcmReceiver::Receive(std::span<uint8_t> buffer) {
   for (int i = 0; i < kBurst; ++i) {
     sockaddr_in from{};
     socklen_t length = sizeof from;
     const ssize_t size = recvfrom(socket_.get(), buffer.data(), buffer.size(), 0,
                                   reinterpret_cast<sockaddr*>(&from), &length);
-    if (size < 0) return;
+    if (size < 0) return false;
     const uint64_t sender = uint64_t{from.sin_addr.s_addr} << 16 | from.sin_port;
     const std::lock_guard lock(mutex_);
     if (const auto message = datagrams_.Take(sender, buffer.first(static_cast<size_t>(size))))
       Keep(*message);
   }
+  return true;
 }
 
 void LcmReceiver::Keep(const LcmDatagrams::Message& message) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <netinet/in.h>
+
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -54,6 +56,9 @@ class LcmReceiver {
   /// Handles the messages that are there when it is called, at most `max_messages`, in the order in
   /// which they arrived, whoever they are for. @return how many.
   int Drain(int max_messages);
+  /// Leaves the group: what is sent from now on is not heard, and all that was sent before waits to
+  /// be drained.
+  void Leave();
   /// When the message that is being handled arrived, monotonic [us].
   int64_t arrival() const { return arrival_; }
   /// Since the last call.
@@ -62,13 +67,15 @@ class LcmReceiver {
  private:
   void Open(const MulticastAddress& address);
   void Work();
-  void Receive(std::span<uint8_t> buffer);
+  void StopWork();
+  bool Receive(std::span<uint8_t> buffer);
   void Keep(const LcmDatagrams::Message& message);
   bool Wanted(std::string_view channel) const;
   Queue* Oldest();
 
   FileDescriptor socket_, waiting_fd_, stop_fd_;
-  LcmDatagrams datagrams_;  // of the thread
+  ip_mreqn membership_{};
+  LcmDatagrams datagrams_;  // of the thread, while there is one
   std::mutex mutex_;        // of what follows
   std::list<Queue> queues_;
   uint64_t arrived_ = 0;  // messages so far

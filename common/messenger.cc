@@ -187,6 +187,12 @@ int Messenger::Drain(int max_messages) {
   return handled;
 }
 
+void Messenger::DrainForGood() {
+  if (receiver_) receiver_->Leave();
+  while (Drain() > 0) {
+  }
+}
+
 int Messenger::Handle(int max_messages) {
   if (receiver_) return receiver_->Drain(max_messages);
   int handled = 0;

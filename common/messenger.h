@@ -55,6 +55,9 @@ class Messenger {
   /// the end of a file or on failure.
   /// @throws std::runtime_error if two speak on a channel that is one's, naming channel and both.
   int Drain(int max_messages = 1000);
+  /// Handles all that was sent before, and hears nothing of what is sent from now on, where the URL
+  /// is one of multicast. @throws as Drain.
+  void DrainForGood();
   /// Messages that came faster than they were drained, since the last call: of each listener
   /// LcmReceiver::kMaxQueued bytes are kept.
   std::vector<LcmReceiver::Loss> TakeLosses() {

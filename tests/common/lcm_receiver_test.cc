@@ -137,6 +137,19 @@ TEST_CASE("what arrives while it is drained waits for the next time") {
   CHECK(poll(&readable, 1, 10'000) == 1);
 }
 
+TEST_CASE("who leaves has all that was sent before, and nothing of what is sent afterwards") {
+  Heard heard;
+  const RawSender group(kGroup, kPort);
+  constexpr size_t kMessages = 200;  // fit into any kernel's buffer, should nobody be quick enough
+  for (size_t i = 0; i < kMessages; ++i) group.Send(Whole("A", std::to_string(i)));
+  heard.receiver.Leave();
+  group.Send(Whole("A", "end"));
+  heard.receiver.Leave();  // once more is nothing else
+  heard.receiver.Drain(1'000'000);
+  REQUIRE(heard.messages.size() == kMessages);
+  for (size_t i = 0; i < kMessages; ++i) REQUIRE(heard.messages[i] == "A " + std::to_string(i));
+}
+
 TEST_CASE("a group that cannot be joined is an error") {
   MulticastAddress address = Address();
   address.group = "192.0.2.1";
