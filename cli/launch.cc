@@ -29,7 +29,7 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 
-// of a virtual robot; a real one is armed by a person, every time
+// of a virtual robot, without an episode in between; a real one is armed by a person, every time
 constexpr int kMaxRearms = 20;
 constexpr int64_t kArmAgain = 500'000;      // [us]
 constexpr int64_t kPoll = 50'000;           // [us]
@@ -53,7 +53,7 @@ class ClosedLoop {
         drivers_(process.messenger(), "DRIVER_STATUS",
                  [&](const driver_status_t& m) { Account(), progress_.OnDriver(m); }),
         controllers_(process.messenger(), "CONTROLLER_STATUS",
-                     [&](const controller_status_t& m) { Account(), progress_.OnController(m); }),
+                     [&](const controller_status_t& m) { OnController(m); }),
         calibrations_(
             process.messenger(), "CALIBRATION_STATUS",
             [&](const calibration_status_t& m) { Account(), progress_.OnCalibration(m); }),
@@ -112,6 +112,13 @@ class ClosedLoop {
   }
 
  private:
+  void OnController(const controller_status_t& m) {
+    Account();
+    if (m.num_episodes != episodes_) futile_rearms_ = 0;
+    episodes_ = m.num_episodes;
+    progress_.OnController(m);
+  }
+
   /// Before each message, too: the time up to it belongs to what the run was doing until then.
   void Account() {
     progress_.Account(Seconds(clock_.Now() - start_), SecondsSince(really_started_));
@@ -218,11 +225,18 @@ class ClosedLoop {
     if (stopped_) return true;
     if (driver.state == driver_status_t::FAULT && !fault_seen_) {
       fault_seen_ = true;
-      Print("driver fault: " + driver.reason);
+      const controller_status_t& controller = progress_.controller();
+      Print("driver fault: " + driver.reason +
+            (controller.phase == controller_status_t::HALTED
+                 ? "; the controller has halted: " + controller.reason
+                 : ""));
       if (flags_.real) Print("Look at the robot. To go on: " + ArmCommand());
-      if (!flags_.real && ++rearms_ > kMaxRearms) {
-        std::cerr << "plumb: too many faults\n";
-        return false;
+      if (!flags_.real) {
+        ++rearms_;
+        if (++futile_rearms_ > kMaxRearms) {
+          std::cerr << "plumb: too many faults without an episode in between\n";
+          return false;
+        }
       }
     }
     if (driver.state == driver_status_t::ARMED) fault_seen_ = false;
@@ -295,7 +309,8 @@ class ClosedLoop {
   int64_t last_request_ = start_;
   ProgressLine line_{true, std::cout};
   bool fault_seen_ = false, stopped_ = false, stopped_from_outside_ = false;
-  int rearms_ = 0;
+  int rearms_ = 0, futile_rearms_ = 0;  // in all; since the last episode
+  int32_t episodes_ = 0;                // done with the policy in use
   std::set<std::string> strange_channels_;
   RunProcesses processes_;  // is stopped first
 };

@@ -34,6 +34,7 @@ class Progress {
   void Account(double seconds, double real_seconds);
 
   const driver_status_t& driver() const { return driver_; }
+  const controller_status_t& controller() const { return controller_; }
   /// Table rows that have become complete since the last call, and below them what has been decided
   /// on the policies that they rest on.
   std::vector<std::string> TakeRows();

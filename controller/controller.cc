@@ -226,14 +226,16 @@ std::optional<joint_command_t> Controller::OnState(const robot_state_t& state, i
   if (!talking || phase() == controller_status_t::HALTED) return {};
 
   if (phase() == controller_status_t::RUNNING) {
-    if (!finite) return Halt("the state is not finite", utime);
-    if (!rotates) return Halt("the state's q " + space_.Fault(Map(state.q)), utime);
     if (late) return Halt("the state is late", utime);
-    if (!state.valid)
-      return Halt(
-          state.restarted ? "the estimator restarted in an episode" : "the state is not valid",
-          utime);
-    return Act(state, utime);
+    if (finite && rotates && state.valid) return Act(state, utime);
+    // How a base that only feels its legs moves, the policy has seen to.
+    if (robot_.estimator.base == EstimatorSettings::Base::kLegs && record_.steps > 0)
+      FinishEpisode(acted_on_, true);
+    return Halt(!finite           ? "the state is not finite"
+                : !rotates        ? "the state's q " + space_.Fault(Map(state.q))
+                : state.restarted ? "the estimator restarted in an episode"
+                                  : "the state is not valid",
+                utime);
   }
   const bool good = finite && rotates && state.valid && !late;
   if (phase() == controller_status_t::PLACING && good && ReadyToRun(state, now)) {
@@ -281,7 +283,7 @@ std::optional<joint_command_t> Controller::Act(const robot_state_t& state, int64
   }
   const bool fell = task_->Terminated(q, v);
   if (status_.step >= StepLimit() || fell) {
-    FinishEpisode(state, fell);
+    FinishEpisode(state.sequence, fell);
     return ZeroCommand(utime);
   }
   task_->Observe(q, v, {observation_.data(), static_cast<size_t>(observation_.size())});
@@ -306,6 +308,7 @@ std::optional<joint_command_t> Controller::Act(const robot_state_t& state, int64
     command.effort[static_cast<size_t>(driven_[i])] = effort_[task_->action_indices()[i]];
   step_q_ = q;
   step_v_ = v;
+  acted_on_ = state.sequence;
   ++status_.step;
   return command;
 }
@@ -322,10 +325,10 @@ int Controller::StepLimit() const {
   return Trying() ? trial : std::max(1, all - trial);
 }
 
-void Controller::FinishEpisode(const robot_state_t& state, bool fell) {
+void Controller::FinishEpisode(int64_t last_state_sequence, bool fell) {
   status_.episode.push_back(episode_);
   status_.first_state_sequence.push_back(first_state_sequence_);
-  status_.last_state_sequence.push_back(state.sequence);
+  status_.last_state_sequence.push_back(last_state_sequence);
   status_.returns.push_back(status_.episode_return);
   status_.steps.push_back(record_.steps);
   status_.late_rate.push_back(record_.late_rate);

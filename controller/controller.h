@@ -32,6 +32,9 @@ namespace plumb {
 /// - A late (by arrival or by its own time), invalid or non-finite state, one with a quaternion
 ///   that is no unit one, or a non-finite action halts it: one command of zero effort, then silence
 ///   until the driver has been seen disarmed and armed anew, which takes a person.
+/// - An episode that ends like that is run anew. But a robot whose base only its legs and an IMU
+///   tell of ([estimator] base = "legs"), and that no longer knows where it is, has fallen: its
+///   episode counts, up to the last state that was acted on.
 class Controller {
  public:
   /// @param rest [s] negative: each episode begins in a state of the task's choice, where
@@ -76,7 +79,7 @@ class Controller {
   bool Placed(const robot_state_t& state) const;
   bool Trying() const;
   int StepLimit() const;
-  void FinishEpisode(const robot_state_t& state, bool fell);
+  void FinishEpisode(int64_t last_state_sequence, bool fell);
   joint_command_t Halt(const std::string& reason, int64_t utime);
   joint_command_t ZeroCommand(int64_t utime);
   std::optional<joint_command_t> Act(const robot_state_t& state, int64_t utime);
@@ -112,6 +115,7 @@ class Controller {
 
   int64_t episode_ = -1;
   int64_t first_state_sequence_ = 0;
+  int64_t acted_on_ = -1;      // sequence of the last state that was answered with an effort
   int64_t next_decision_ = 0;  // utime of the state that is to be answered next
   // Of the step under way, whose reward is known when it ends.
   Eigen::VectorXd step_q_, step_v_, effort_;

@@ -26,6 +26,16 @@ constexpr double kLongFlight = 0.5;
 // Share of its weight from which on a body that flies for long is held up. Legs that swing pull and
 // push it by half of that and more.
 constexpr double kHeldUp = 0.9;
+// By which share of what an accelerometer can measure the force is beyond it, where it is. That of
+// an impact fades exponentially: mean and standard deviation are alike.
+constexpr double kBeyond = 0.05;
+
+// [m/s^2] by which the force is beyond what was read of it: on average, and its standard deviation.
+Vector3d Beyond(const Vector3d& reading) {
+  Eigen::Index axis;
+  reading.cwiseAbs().maxCoeff(&axis);
+  return kBeyond * reading[axis] * Vector3d::Unit(axis);
+}
 
 Matrix3d Cross(const Vector3d& a) {
   Matrix3d m;
@@ -91,7 +101,9 @@ void LegOdometry::Restart(Beginning beginning, const Vector3d& position,
       Square(s_.acceleration_bias_sd) * in_body * allowed_ * in_body.transpose();
 }
 
-void LegOdometry::Predict(double dt, const Vector3d& rate, const Vector3d& force) {
+void LegOdometry::Predict(double dt, const Vector3d& rate, const Vector3d& reading, bool clipped) {
+  const Vector3d beyond = clipped ? Beyond(reading) : Vector3d(Vector3d::Zero()),
+                 force = reading + beyond;
   const Matrix3d start = orientation_.toRotationMatrix();
   const Vector3d in_plane = start.transpose() * allowed_turn_ * start * rate;
   const Vector3d last_rate = force_ ? rate_ : in_plane;
@@ -136,12 +148,14 @@ void LegOdometry::Predict(double dt, const Vector3d& rate, const Vector3d& force
   // Readings that are missing were as wrong as the one that is there may be of them. When within a
   // period the force of an impact acted is not known, nor when the rate changed: anywhere in it.
   const double periods = std::max(1.0, dt / s_.period);
-  const double velocity = Square(s_.acceleration_sd * dt * periods);
   const double within = Square(acceleration_change_ * dt * dt) / 12;
-  p.block<3, 3>(kVelocity, kVelocity) += velocity * allowed_;
-  p.block<3, 3>(kPosition, kPosition) += (velocity * dt * dt / 4 + within) * allowed_;
-  p.block<3, 3>(kPosition, kVelocity) += velocity * dt / 2 * allowed_;
-  p.block<3, 3>(kVelocity, kPosition) += velocity * dt / 2 * allowed_;
+  const Vector3d unread = dt * (allowed_ * (half * beyond));
+  const Matrix3d velocity =
+      Square(s_.acceleration_sd * dt * periods) * allowed_ + unread * unread.transpose();
+  p.block<3, 3>(kVelocity, kVelocity) += velocity;
+  p.block<3, 3>(kPosition, kPosition) += dt * dt / 4 * velocity + within * allowed_;
+  p.block<3, 3>(kPosition, kVelocity) += dt / 2 * velocity;
+  p.block<3, 3>(kVelocity, kPosition) += dt / 2 * velocity;
   p.block<3, 3>(kAngle, kAngle) +=
       (Square(s_.rate_sd * dt * periods) + Square(rate_change_ * dt) / 12) * allowed_turn_;
   const Matrix3d turns = half.transpose() * allowed_turn_ * half,

@@ -62,7 +62,7 @@ bool StateObserver::UseImu(Imu& imu, const ImuInbox::Reading& reading,
   const double age = Seconds(late) + imu.delay;
   const double elapsed = imu.used < 0 ? 0 : Seconds(reading.utime - imu.used);
   imu.used = std::max(imu.used, reading.utime);
-  if (reading.clipped) return false;
+  if (reading.clipped && !imu.of_base) return false;
   if (imu.of_base) return UseForBase(reading, measured.utime, Microseconds(imu.delay));
   if (imu.mounting.turned >= 0) {
     // JOINT_STATE has the last reading of each of its periods; those in between, only we have.

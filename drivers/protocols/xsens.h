@@ -43,8 +43,10 @@ inline constexpr Layout kAcceleration{0x34, "Acceleration", 6,
 
 /// Bits of StatusWord. The self-test bit is not among those an MTi-600 reports.
 inline constexpr uint32_t kOrientationValid = 0x02;
-/// accelerometer, gyroscope, "clipping detected"
-inline constexpr uint32_t kClipped = 0x3F00 | 0x80000;
+/// Of the accelerometer's and the gyroscope's first axis; those of the other two follow.
+inline constexpr uint32_t kClippedForce = 0x100, kClippedRate = 0x800;
+/// any of them, or "clipping detected"
+inline constexpr uint32_t kClipped = 7 * kClippedForce | 7 * kClippedRate | 0x80000;
 
 constexpr Frame Make(const Layout& layout, int base, std::initializer_list<double> values) {
   Frame frame;

@@ -1,5 +1,6 @@
 #include "drivers/protocols/xsens_device.h"
 
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -10,6 +11,15 @@ namespace plumb {
 using namespace xsens;
 
 namespace {
+
+// The bits of the axes on which there is more than the message can say.
+uint32_t Beyond(const Layout& layout, const std::array<double, 3>& values, uint32_t first_axis) {
+  uint32_t bits = 0;
+  for (size_t i = 0; i < values.size(); ++i) {
+    if (!layout.fields[i].Holds(values[i])) bits |= first_axis << i;
+  }
+  return bits;
+}
 
 class Imu : public SensorDevice {
  public:
@@ -55,7 +65,9 @@ void XsensDevice::Tick(int64_t now, const Sample& sample, FrameBatch& out) noexc
   const auto& [w, x, y, z] = sample.orientation;
   out.Push(Make(kSampleTime, base, {double(ticks)}));
   if (settings_.group_counter) out.Push(Make(kGroupCounter, base, {double(counter_++)}));
-  out.Push(Make(kStatusWord, base, {double(sample.status)}));
+  const uint32_t status = sample.status | Beyond(kAcceleration, sample.force, kClippedForce) |
+                          Beyond(kRateOfTurn, sample.rate, kClippedRate);
+  out.Push(Make(kStatusWord, base, {double(status)}));
   out.Push(Make(kQuaternion, base, {w, x, y, z}));
   out.Push(Make(kRateOfTurn, base, {sample.rate[0], sample.rate[1], sample.rate[2]}));
   out.Push(Make(kAcceleration, base, {sample.force[0], sample.force[1], sample.force[2]}));

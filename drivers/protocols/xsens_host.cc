@@ -1,5 +1,6 @@
 #include "drivers/protocols/xsens_host.h"
 
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -14,6 +15,15 @@ using namespace xsens;
 // A quaternion of four rounded numbers; anything farther from unit length is no orientation.
 constexpr double kNormTolerance = 1e-3;
 constexpr int kHighestId = 0x7F;
+
+// What is at a field's end may be anything beyond it, whatever the status says.
+bool AtItsEnd(const Layout& layout, const std::array<double, 3>& values) {
+  for (size_t i = 0; i < values.size(); ++i) {
+    const Field& field = layout.fields[i];
+    if (values[i] <= field.lowest() || values[i] >= field.highest()) return true;
+  }
+  return false;
+}
 
 class XsensImu : public Sensor {
  public:
@@ -175,7 +185,8 @@ class XsensImu : public Sensor {
       for (double& q : next_.orientation) q /= std::sqrt(square);
     }
     next_.orientation_valid = unit && (status_ & kOrientationValid) != 0;
-    next_.clipped = (status_ & kClipped) != 0;
+    next_.clipped = (status_ & kClipped) != 0 || AtItsEnd(kRateOfTurn, next_.rate) ||
+                    AtItsEnd(kAcceleration, next_.force);
     next_.sample_time = std::llround(static_cast<double>(elapsed_) * tick_);
     sample_ = next_;
     sampled_ = running_ = true;

@@ -90,6 +90,71 @@ TEST_CASE_METHOD(Surroundings,
   CHECK(controller.status().num_episodes == 1);
 }
 
+struct WithoutBoom : Surroundings {
+  WithoutBoom() : Surroundings("robots/hopper/free.toml") {}
+  void RunFor(int steps) {
+    StepUntil(S::RUNNING);
+    while (controller.status().step < steps) Step();
+  }
+  void RearmDriver() {
+    Driver(driver_status_t::FAULT);
+    Driver(driver_status_t::ARMED);
+  }
+};
+
+TEST_CASE_METHOD(WithoutBoom, "who no longer knows where the base is has fallen") {
+  Driver(driver_status_t::ARMED);
+  controller.OnPolicy(Policy(0, 2));
+  RunFor(20);
+  const double so_far = controller.status().episode_return;
+  const int64_t acted_on = robot_state.sequence;
+  const robot_state_t known = robot_state;
+  SECTION("not valid") { robot_state.valid = 0; }
+  SECTION("begun anew") { robot_state.valid = 0, robot_state.restarted = 1; }
+  SECTION("not known") { robot_state.q[1] = std::numeric_limits<double>::quiet_NaN(); }
+  const auto command = Step();
+  robot_state.valid = 1, robot_state.restarted = 0, robot_state.q = known.q;
+  REQUIRE(command);
+  CHECK(command->effort == std::vector<double>(6, 0));
+  REQUIRE(controller.phase() == S::HALTED);
+  const controller_status_t& status = controller.status();
+  REQUIRE(status.num_episodes == 1);
+  CHECK(status.fell[0] == 1);
+  CHECK(status.returns[0] == so_far);
+  CHECK(status.steps[0] == 19);  // of the twentieth nobody knows how it ended
+  CHECK(status.last_state_sequence[0] == acted_on);
+  CHECK(status.episodes_aborted == 0);
+  for (int i = 0; i < 100; ++i) CHECK_FALSE(Step());
+  RearmDriver();
+  RunFor(5);  // the second one
+  robot_state.valid = 0;
+  Step();
+  robot_state.valid = 1;
+  CHECK(status.num_episodes == 2);
+  RearmDriver();
+  StepUntil(S::COMPLETE);
+  CHECK(status.num_episodes == 2);
+}
+
+TEST_CASE_METHOD(WithoutBoom, "a late state, or one lost before the first step's end, is no fall") {
+  Driver(driver_status_t::ARMED);
+  controller.OnPolicy(Policy(0));
+  SECTION("late") {
+    RunFor(20);
+    now += 150'000, utime += 150'000;
+    controller.Tick(now, utime);
+  }
+  SECTION("lost at once") {
+    RunFor(1);
+    robot_state.valid = 0;
+    Step();
+    robot_state.valid = 1;
+  }
+  REQUIRE(controller.phase() == S::HALTED);
+  CHECK(controller.status().num_episodes == 0);
+  CHECK(controller.status().episodes_aborted == 1);
+}
+
 TEST_CASE_METHOD(Surroundings,
                  "a driver that disarms ends the episode; a silent driver counts as absent") {
   Driver(driver_status_t::ARMED);

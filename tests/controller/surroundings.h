@@ -12,11 +12,14 @@ namespace plumb {
 /// The world around a controller, in steps of one measurement (5 ms).
 class Surroundings {
  public:
-  Surroundings()
-      : robot(LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/pendulum")),
+  explicit Surroundings(const std::string& folder = "robots/pendulum")
+      : robot(LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/" + folder)),
         controller(robot, 1) {
-    robot_state.num_positions = robot_state.num_velocities = 1;
-    robot_state.q = robot_state.v = robot_state.q_sd = robot_state.v_sd = robot_state.effort = {0};
+    robot_state.num_positions = robot.num_positions();
+    robot_state.num_velocities = robot.num_velocities();
+    robot_state.q.assign(static_cast<size_t>(robot.num_positions()), 0);
+    for (auto* values : {&robot_state.v, &robot_state.q_sd, &robot_state.v_sd, &robot_state.effort})
+      values->assign(static_cast<size_t>(robot.num_velocities()), 0);
     robot_state.valid = 1;
   }
 
@@ -28,9 +31,11 @@ class Surroundings {
 
   policy_t Policy(int iteration, int episodes = 1, float bias = 0,
                   int8_t purpose = policy_t::EVALUATE) {
-    GaussianPolicy policy(PolicyShape{3, {4}, 1});
-    policy.parameters(policy.parameters.size() - 2) = bias;  // of the output
-    policy.action_scale.setConstant(2);
+    const auto task = MakeTask(robot);
+    const int actions = task->action_size();
+    GaussianPolicy policy(PolicyShape{task->observation_size(), {4}, actions});
+    policy.parameters(policy.parameters.size() - 1 - actions) = bias;  // of the last output
+    policy.action_scale = robot.effort_limits().cast<float>();
     policy_t message = policy.ToMessage();
     message.utime = 1000 + iteration;
     message.iteration = iteration;

@@ -189,6 +189,12 @@ TEST_CASE_METHOD(Fixture, "gaps, lateness, restarts and rubbish are dropped and 
     CHECK(joiner.drops().summary() ==
           "0 gaps, 0 late, 0 not finite, 0 across restarts, 2 model-based");
   }
+  SECTION("an end of which nothing is known but the last state that was acted on") {
+    States();
+    Commands();
+    CHECK(joiner.Join(42, 290).transitions.size() == 19);
+    CHECK(joiner.drops().total() == 0);
+  }
   SECTION("an unknown effort") {
     States();
     robot_state_t unknown = State(155);

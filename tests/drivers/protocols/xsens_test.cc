@@ -1,5 +1,7 @@
 #include "drivers/protocols/xsens.h"
 
+#include <fmt/format.h>
+
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <functional>
@@ -191,6 +193,37 @@ TEST_CASE("the status word says what a sample is worth") {
     use(text);
   CHECK(use("3B4#000000000000") == SensorUse::kReading);
   CHECK_FALSE(bench.sensor->imu()->orientation_valid);  // no unit quaternion
+}
+
+TEST_CASE("what is beyond a message's range is known to be") {
+  Bench bench;
+  std::string status;
+  XsensDevice device({.base = 0x380}, 0);
+  FrameBatch out;
+  device.Tick(5000, {.rate = {0, -70, 0}, .force = {130, 0, -150}}, out);
+  for (const Frame& frame : out.frames()) {
+    bench.sensor->OnFrame(frame, bench.now);
+    if (frame.id == 0x391) status = ToText(frame);
+  }
+  // orientation valid; accelerometer x and z, gyroscope y
+  CHECK(status == "391#00001502");
+  CHECK(bench.sensor->imu()->clipped);
+  CHECK(bench.sensor->imu()->force[0] == Approx(128).margin(0.01));
+  CHECK(bench.sensor->imu()->force[2] == -128);
+
+  uint32_t tick = 100;
+  const auto clipped = [&](const std::string& rate, const std::string& force) {
+    for (const std::string& text :
+         {fmt::format("385#{:08X}", tick += 50), std::string("391#00000002"),
+          std::string("3A1#7FFF000000000000"), "3B2#" + rate, "3B4#" + force})
+      bench.sensor->OnFrame(*FrameFromText(text), bench.now);
+    return bench.sensor->imu()->clipped;
+  };
+  CHECK_FALSE(clipped("000000000000", "000000007FFE"));
+  CHECK(clipped("000000000000", "000000007FFF"));  // whatever the status word says
+  CHECK(clipped("000000000000", "800000000000"));
+  CHECK(clipped("00007FFF0000", "000000000000"));
+  CHECK_FALSE(clipped("000080010000", "000000000000"));
 }
 
 TEST_CASE("a restart and an error are faults, silence is absence, missing messages are named") {
