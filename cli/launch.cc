@@ -15,6 +15,7 @@
 
 #include "cli/launch_report.h"
 #include "cli/progress.h"
+#include "cli/rearming.h"
 #include "cli/run_processes.h"
 #include "cli/run_setting.h"
 #include "common/atomic_file.h"
@@ -29,9 +30,6 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 
-// of a virtual robot, without an episode in between; a real one is armed by a person, every time
-constexpr int kMaxRearms = 20;
-constexpr int64_t kArmAgain = 500'000;      // [us]
 constexpr int64_t kPoll = 50'000;           // [us]
 constexpr int64_t kDoubt = 300'000;         // [us]; three statuses of the controller
 constexpr size_t kMaxStrangeChannels = 10;  // that are named: strangers choose how many there are
@@ -53,7 +51,7 @@ class ClosedLoop {
         drivers_(process.messenger(), "DRIVER_STATUS",
                  [&](const driver_status_t& m) { Account(), progress_.OnDriver(m); }),
         controllers_(process.messenger(), "CONTROLLER_STATUS",
-                     [&](const controller_status_t& m) { OnController(m); }),
+                     [&](const controller_status_t& m) { Account(), progress_.OnController(m); }),
         calibrations_(
             process.messenger(), "CALIBRATION_STATUS",
             [&](const calibration_status_t& m) { Account(), progress_.OnCalibration(m); }),
@@ -112,13 +110,6 @@ class ClosedLoop {
   }
 
  private:
-  void OnController(const controller_status_t& m) {
-    Account();
-    if (m.num_episodes != episodes_) futile_rearms_ = 0;
-    episodes_ = m.num_episodes;
-    progress_.OnController(m);
-  }
-
   /// Before each message, too: the time up to it belongs to what the run was doing until then.
   void Account() {
     progress_.Account(Seconds(clock_.Now() - start_), SecondsSince(really_started_));
@@ -214,39 +205,14 @@ class ClosedLoop {
            ": the same command goes on from there with --output " + output;
   }
 
-  // A virtual robot is armed at the beginning, and again after a fault, though not for ever. What a
-  // person has stopped, and a real robot in any case, only a person starts.
   bool KeepArmed() {
-    const driver_status_t& driver = progress_.driver();
-    if (driver.stopped_by_request != stopped_) {
-      stopped_ = driver.stopped_by_request;
-      if (stopped_) Print("stopped by request. To go on: " + ArmCommand());
-    }
-    if (stopped_) return true;
-    if (driver.state == driver_status_t::FAULT && !fault_seen_) {
-      fault_seen_ = true;
-      const controller_status_t& controller = progress_.controller();
-      Print("driver fault: " + driver.reason +
-            (controller.phase == controller_status_t::HALTED
-                 ? "; the controller has halted: " + controller.reason
-                 : ""));
-      if (flags_.real) Print("Look at the robot. To go on: " + ArmCommand());
-      if (!flags_.real) {
-        ++rearms_;
-        if (++futile_rearms_ > kMaxRearms) {
-          std::cerr << "plumb: too many faults without an episode in between\n";
-          return false;
-        }
-      }
-    }
-    if (driver.state == driver_status_t::ARMED) fault_seen_ = false;
-    const bool down =
-        driver.state == driver_status_t::IDLE || driver.state == driver_status_t::FAULT;
-    if (down && !flags_.real && clock_.Now() - last_request_ > kArmAgain) {
-      Request(driver_request_t::ARM);
-      last_request_ = clock_.Now();
-    }
-    return true;
+    const Rearming::Advice advice =
+        rearming_.Next(progress_.driver(), progress_.controller(), clock_.Now());
+    for (const std::string& line : advice.lines) Print(line);
+    if (advice.arm) Request(driver_request_t::ARM);
+    if (advice.give_up)
+      std::cerr << "plumb: too many faults without an episode in between" << std::endl;
+    return !advice.give_up;
   }
 
   /// For a person to type.
@@ -270,7 +236,7 @@ class ClosedLoop {
     summary["time"] = setting_.virtual_run ? "virtual" : "real";
     if (!setting_.virtual_run) summary["speed"] = clock_.scale();
     summary["bus"] = InOneLine(robot_.buses);
-    summary["rearms"] = rearms_;
+    summary["rearms"] = rearming_.count();
     summary["version"] = VersionLine("plumb");
     if (!flags_.summary.empty()) {
       WriteAtomically(flags_.summary,
@@ -306,11 +272,9 @@ class ClosedLoop {
   Subscriber<training_status_t> trainings_;
   const SteadyClock::time_point really_started_ = SteadyClock::now();
   SteadyClock::time_point last_status_ = really_started_;
-  int64_t last_request_ = start_;
   ProgressLine line_{true, std::cout};
-  bool fault_seen_ = false, stopped_ = false, stopped_from_outside_ = false;
-  int rearms_ = 0, futile_rearms_ = 0;  // in all; since the last episode
-  int32_t episodes_ = 0;                // done with the policy in use
+  Rearming rearming_{flags_.real, ArmCommand(), start_};
+  bool stopped_from_outside_ = false;
   std::set<std::string> strange_channels_;
   RunProcesses processes_;  // is stopped first
 };

@@ -70,6 +70,9 @@ class Controller {
   int64_t changes() const { return changes_; }
 
  private:
+  static Eigen::Map<const Eigen::VectorXd> Map(const std::vector<double>& values) {
+    return {values.data(), static_cast<Eigen::Index>(values.size())};
+  }
   bool Armed() const { return driver_state_ == driver_status_t::ARMED; }
   void Enter(int8_t phase, const std::string& reason = {});
   void TakePolicy();
