@@ -25,10 +25,10 @@ Rearming::Advice Rearming::Next(const driver_status_t& driver,
     if (real_) {
       advice.lines.push_back("Look at the robot. To go on: " + command_);
     } else {
-      ++count_;
-      advice.give_up = ++since_episode_ > kMost;
+      ++count_, ++since_episode_;
     }
   }
+  advice.give_up = since_episode_ > kMost;
   if (driver.state == driver_status_t::ARMED) fault_seen_ = false;
   const bool down = driver.state == driver_status_t::IDLE || driver.state == driver_status_t::FAULT;
   if (down && !real_ && !advice.give_up && now - last_request_ > kArmAgain) {
