@@ -26,11 +26,10 @@ constexpr double kLongFlight = 0.5;
 // Share of its weight from which on a body that flies for long is held up. Legs that swing pull and
 // push it by half of that and more.
 constexpr double kHeldUp = 0.9;
-// By which share of what an accelerometer can measure the force is beyond it, where it is. That of
-// an impact fades exponentially: mean and standard deviation are alike.
-constexpr double kBeyond = 0.05;
+// Share of what an accelerometer can measure by which an impact's force, as a rule, is beyond it.
+constexpr double kBeyond = 0.1;
 
-// [m/s^2] by which the force is beyond what was read of it: on average, and its standard deviation.
+// [m/s^2] by which the force may be beyond what was read of it.
 Vector3d Beyond(const Vector3d& reading) {
   Eigen::Index axis;
   reading.cwiseAbs().maxCoeff(&axis);
@@ -101,9 +100,7 @@ void LegOdometry::Restart(Beginning beginning, const Vector3d& position,
       Square(s_.acceleration_bias_sd) * in_body * allowed_ * in_body.transpose();
 }
 
-void LegOdometry::Predict(double dt, const Vector3d& rate, const Vector3d& reading, bool clipped) {
-  const Vector3d beyond = clipped ? Beyond(reading) : Vector3d(Vector3d::Zero()),
-                 force = reading + beyond;
+void LegOdometry::Predict(double dt, const Vector3d& rate, const Vector3d& force, bool clipped) {
   const Matrix3d start = orientation_.toRotationMatrix();
   const Vector3d in_plane = start.transpose() * allowed_turn_ * start * rate;
   const Vector3d last_rate = force_ ? rate_ : in_plane;
@@ -149,7 +146,8 @@ void LegOdometry::Predict(double dt, const Vector3d& rate, const Vector3d& readi
   // period the force of an impact acted is not known, nor when the rate changed: anywhere in it.
   const double periods = std::max(1.0, dt / s_.period);
   const double within = Square(acceleration_change_ * dt * dt) / 12;
-  const Vector3d unread = dt * (allowed_ * (half * beyond));
+  const Vector3d unread =
+      clipped ? Vector3d(dt * (allowed_ * (half * Beyond(force)))) : Vector3d(Vector3d::Zero());
   const Matrix3d velocity =
       Square(s_.acceleration_sd * dt * periods) * allowed_ + unread * unread.transpose();
   p.block<3, 3>(kVelocity, kVelocity) += velocity;
