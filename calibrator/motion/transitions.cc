@@ -166,7 +166,6 @@ Rollout TransitionJoiner::Join(int64_t episode, int64_t last_state) {
     Transition transition;
     transition.step = command->first;
     const int64_t to = next != commands.end() ? next->second.state_sequence : last_state;
-    if (to == command->second.state_sequence) continue;  // nobody knows where its step ended
     if (JoinOne(command->second.state_sequence, to, &transition, &drops_))
       rollout.transitions.push_back(std::move(transition));
   }

@@ -76,8 +76,8 @@ JointMeasurement JointSensor::OfImu(const ImuSample& sample) noexcept {
   const double near = std::isfinite(newest_.position) && turns_counted_ ? newest_.position : 0;
   turns_counted_ = true;
   const double rate = mounting_.axis.dot(to_link_ * Vector(sample.rate));
-  return {near + std::remainder(twist - near, 2 * std::numbers::pi), sample.clipped ? kNone : rate,
-          kNone};
+  return {near + std::remainder(twist - near, 2 * std::numbers::pi),
+          sample.rate_clipped ? kNone : rate, kNone};
 }
 
 const JointMeasurement& JointSensor::At(int64_t utime) noexcept {
@@ -117,7 +117,7 @@ const imu_t* JointSensor::NextImu() noexcept {
   message_.orientation[2] = link.y();
   message_.orientation[3] = link.z();
   message_.orientation_valid = sample.orientation_valid;
-  message_.clipped = sample.clipped;
+  message_.clipped = sample.rate_clipped || sample.force_clipped;
   imu_samples_.Pop();
   return &message_;
 }

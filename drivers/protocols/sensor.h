@@ -37,7 +37,8 @@ struct ImuSample {
   /// unit quaternion (w, x, y, z): its axes -> the world's, z up
   std::array<double, 4> orientation{};
   bool orientation_valid = false;  ///< the sensor's filter trusts the orientation
-  bool clipped = false;            ///< rate or force was beyond what it can measure
+  /// it was beyond what it can measure
+  bool rate_clipped = false, force_clipped = false;
 };
 
 /// A sensor's verdict on a frame.

@@ -45,8 +45,8 @@ inline constexpr Layout kAcceleration{0x34, "Acceleration", 6,
 inline constexpr uint32_t kOrientationValid = 0x02;
 /// Of the accelerometer's and the gyroscope's first axis; those of the other two follow.
 inline constexpr uint32_t kClippedForce = 0x100, kClippedRate = 0x800;
-/// any of them, or "clipping detected"
-inline constexpr uint32_t kClipped = 7 * kClippedForce | 7 * kClippedRate | 0x80000;
+inline constexpr uint32_t kForceAxes = 7 * kClippedForce, kRateAxes = 7 * kClippedRate;
+inline constexpr uint32_t kClippingDetected = 0x80000;  ///< on any axis of anything
 
 constexpr Frame Make(const Layout& layout, int base, std::initializer_list<double> values) {
   Frame frame;

@@ -185,8 +185,11 @@ class XsensImu : public Sensor {
       for (double& q : next_.orientation) q /= std::sqrt(square);
     }
     next_.orientation_valid = unit && (status_ & kOrientationValid) != 0;
-    next_.clipped = (status_ & kClipped) != 0 || AtItsEnd(kRateOfTurn, next_.rate) ||
-                    AtItsEnd(kAcceleration, next_.force);
+    const uint32_t axes = status_ & (kForceAxes | kRateAxes);
+    const bool somewhere = (status_ & kClippingDetected) != 0 && axes == 0;
+    next_.rate_clipped = somewhere || (axes & kRateAxes) != 0 || AtItsEnd(kRateOfTurn, next_.rate);
+    next_.force_clipped =
+        somewhere || (axes & kForceAxes) != 0 || AtItsEnd(kAcceleration, next_.force);
     next_.sample_time = std::llround(static_cast<double>(elapsed_) * tick_);
     sample_ = next_;
     sampled_ = running_ = true;

@@ -58,7 +58,8 @@ class Imu : public VirtualSensor {
     for (size_t i = 0; i < 4 && imu.orientation_valid; ++i) {
       same = same && near(imu.orientation[i], sample_.orientation[i], 2e-3);
     }
-    return same && imu.clipped == ((sample_.status & kClipped) != 0);
+    const bool any = (sample_.status & (kForceAxes | kRateAxes | kClippingDetected)) != 0;
+    return same && (imu.rate_clipped || imu.force_clipped) == any;
   }
 
  private:

@@ -193,7 +193,8 @@ TEST_CASE_METHOD(Fixture, "gaps, lateness, restarts and rubbish are dropped and 
     States();
     Commands();
     CHECK(joiner.Join(42, 290).transitions.size() == 19);
-    CHECK(joiner.drops().total() == 0);
+    CHECK(joiner.drops().gap == 1);
+    CHECK(joiner.drops().total() == 1);
   }
   SECTION("an unknown effort") {
     States();

@@ -69,7 +69,7 @@ TEST_CASE("a rate beyond the IMU's range is none") {
   Torso torso;
   torso.Run(50);
   CHECK(std::isfinite(torso.sensor.newest().velocity));
-  torso.sample.status |= xsens::kClipped;
+  torso.sample.status |= xsens::kClippingDetected;
   torso.Run(20);
   CHECK(std::isfinite(torso.sensor.newest().position));
   CHECK(std::isnan(torso.sensor.newest().velocity));

@@ -126,7 +126,8 @@ TEST_CASE("samples are given out when they are complete") {
   const ImuSample& got = *bench.sensor->imu();
   CHECK(got.force[2] == Approx(9.81).margin(0.002));
   CHECK(got.orientation_valid);
-  CHECK_FALSE(got.clipped);
+  CHECK_FALSE(got.rate_clipped);
+  CHECK_FALSE(got.force_clipped);
   CHECK(got.sample_time == 199 * 5000);
   CHECK(bench.sensor->encoder() == nullptr);
 }
@@ -184,7 +185,16 @@ TEST_CASE("the status word says what a sample is worth") {
   bench.sample.status = kOrientationValid | 1u << 12;
   bench.Run(10);
   CHECK(bench.sensor->imu()->orientation_valid);
-  CHECK(bench.sensor->imu()->clipped);
+  CHECK(bench.sensor->imu()->rate_clipped);
+  CHECK_FALSE(bench.sensor->imu()->force_clipped);
+  bench.sample.status = kOrientationValid | kClippingDetected;  // and nobody says of what
+  bench.Run(10);
+  CHECK(bench.sensor->imu()->rate_clipped);
+  CHECK(bench.sensor->imu()->force_clipped);
+  bench.sample.status = kOrientationValid | kClippingDetected | 1u << 9;
+  bench.Run(10);
+  CHECK_FALSE(bench.sensor->imu()->rate_clipped);
+  CHECK(bench.sensor->imu()->force_clipped);
   const auto use = [&](const char* text) {
     return bench.sensor->OnFrame(*FrameFromText(text), bench.now);
   };
@@ -207,7 +217,8 @@ TEST_CASE("what is beyond a message's range is known to be") {
   }
   // orientation valid; accelerometer x and z, gyroscope y
   CHECK(status == "391#00001502");
-  CHECK(bench.sensor->imu()->clipped);
+  CHECK(bench.sensor->imu()->rate_clipped);
+  CHECK(bench.sensor->imu()->force_clipped);
   CHECK(bench.sensor->imu()->force[0] == Approx(128).margin(0.01));
   CHECK(bench.sensor->imu()->force[2] == -128);
 
@@ -217,13 +228,14 @@ TEST_CASE("what is beyond a message's range is known to be") {
          {fmt::format("385#{:08X}", tick += 50), std::string("391#00000002"),
           std::string("3A1#7FFF000000000000"), "3B2#" + rate, "3B4#" + force})
       bench.sensor->OnFrame(*FrameFromText(text), bench.now);
-    return bench.sensor->imu()->clipped;
+    const ImuSample& got = *bench.sensor->imu();
+    return std::string(got.rate_clipped ? "rate" : "") + (got.force_clipped ? "force" : "");
   };
-  CHECK_FALSE(clipped("000000000000", "000000007FFE"));
-  CHECK(clipped("000000000000", "000000007FFF"));  // whatever the status word says
-  CHECK(clipped("000000000000", "800000000000"));
-  CHECK(clipped("00007FFF0000", "000000000000"));
-  CHECK_FALSE(clipped("000080010000", "000000000000"));
+  CHECK(clipped("000000000000", "000000007FFE").empty());
+  CHECK(clipped("000000000000", "000000007FFF") == "force");  // whatever the status word says
+  CHECK(clipped("000000000000", "800000000000") == "force");
+  CHECK(clipped("00007FFF0000", "000000000000") == "rate");
+  CHECK(clipped("000080010000", "000000000000").empty());
 }
 
 TEST_CASE("a restart and an error are faults, silence is absence, missing messages are named") {
