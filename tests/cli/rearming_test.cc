@@ -7,7 +7,7 @@ namespace {
 
 struct Run {
   explicit Run(bool real = false) : rearming(real, "plumb arm", 0) {}
-  /// The driver says it twice, a second apart.
+  /// A second later, and heard twice.
   Rearming::Advice Say(int8_t state, const std::string& reason = "") {
     driver.state = state, driver.reason = reason;
     const Rearming::Advice first = rearming.Next(driver, controller, now += 1'000'000);
@@ -28,7 +28,7 @@ struct Run {
   int64_t now = 0;
 };
 
-TEST_CASE("a virtual robot is armed again, and it is said why it was not") {
+TEST_CASE("a virtual robot is armed again, and it is said why it was disarmed") {
   Run run;
   CHECK(run.Say(driver_status_t::IDLE).arm);
   CHECK_FALSE(run.Say(driver_status_t::ARMED).arm);
