@@ -14,6 +14,7 @@
 #include "calibrator/live/checkpoint.h"
 #include "calibrator/results/posterior_file.h"
 #include "chaos/expected_transitions.h"
+#include "common/message_bytes.h"
 
 namespace plumb {
 namespace {
@@ -32,13 +33,6 @@ Episode StepsOf(const Rollout& rollout) {
 std::string Contents(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
-}
-
-template <class Message>
-std::vector<uint8_t> Bytes(const Message& message) {
-  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return bytes;
 }
 
 }  // namespace
@@ -129,7 +123,7 @@ void JournalWitness::JudgeFindings(int64_t time, const std::filesystem::path& fo
       chronicle_.Violate(5, time, fmt::format("posterior {} is another", k));
     const auto distribution = said.distributions().find(k);
     if (distribution != said.distributions().end() &&
-        distribution->second != Bytes(DistributionMessage(robot_, again.state(), seed, &*report)))
+        distribution->second != Encode(DistributionMessage(robot_, again.state(), seed, &*report)))
       chronicle_.Violate(5, time, fmt::format("distribution {} is another", k));
     const auto counted_then = said.transitions().find(k);
     if (counted_then != said.transitions().end() &&

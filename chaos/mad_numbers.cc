@@ -4,6 +4,7 @@
 #include <initializer_list>
 #include <limits>
 
+#include "common/message_bytes.h"
 #include "plumb/controller_status_t.hpp"
 #include "plumb/driver_status_t.hpp"
 #include "plumb/imu_t.hpp"
@@ -84,12 +85,9 @@ void Madden(imu_t& m, Random& random) { m.rate[0] = Mad(m.rate[0], random); }
 template <class Message>
 std::optional<std::vector<uint8_t>> Changed(std::span<const uint8_t> bytes, Random& random) {
   Message message;
-  const int size = static_cast<int>(bytes.size());
-  if (message.decode(bytes.data(), 0, size) != size) return std::nullopt;
+  if (!Decode(bytes, message)) return std::nullopt;
   Madden(message, random);
-  std::vector<uint8_t> changed(static_cast<size_t>(message.getEncodedSize()));
-  message.encode(changed.data(), 0, static_cast<int>(changed.size()));
-  return changed;
+  return Encode(message);
 }
 
 }  // namespace

@@ -17,6 +17,7 @@
 #include "chaos/journal_witness.h"
 #include "chaos/little_robot.h"
 #include "chaos/message_witness.h"
+#include "chaos/operator.h"
 #include "chaos/script.h"
 #include "chaos/stack.h"
 #include "chaos/torque_witness.h"
@@ -26,18 +27,14 @@
 #include "common/seal.h"
 #include "common/signature.h"
 #include "common/time_units.h"
-#include "plumb/controller_status_t.hpp"
 #include "plumb/driver_request_t.hpp"
-#include "plumb/driver_status_t.hpp"
-#include "plumb/policy_t.hpp"
 
 namespace plumb {
 namespace {
 
 constexpr int64_t kBeginning = Coordinator::kBeginning;
-constexpr int64_t kLook = 50'000;       // [us] between two looks at how all are
-constexpr int64_t kArmAgain = 500'000;  // [us]
-constexpr int64_t kRestart = 100'000;   // [us] after which one that has ended is started again
+constexpr int64_t kLook = 50'000;      // [us] between two looks at how all are
+constexpr int64_t kRestart = 100'000;  // [us] after which one that has ended is started again
 constexpr int kMostEndings = 100;
 constexpr uint32_t kDeedStream = 0x44656564;  // "Deed"
 constexpr char kBusUrl[] = "loop:chaos";
@@ -65,9 +62,7 @@ class Trial {
                               setting.iterations, 1, setting.seed % 2 == 0}) {
     messenger_.Become(Identity("chaos", key_, Clock(coordinator_.participant().time()),
                                Identity::Reach::kRun, 0));
-    requests_.emplace(messenger_, "DRIVER_REQUEST");
-    drivers_.emplace(messenger_, "DRIVER_STATUS");
-    controllers_.emplace(messenger_, "CONTROLLER_STATUS");
+    operator_.emplace(messenger_);
     coordinator_.on_post = [this](const auto& post, const auto& speaker) { OnSaid(post, speaker); };
     coordinator_.on_way = [this](const auto& post, const auto& speaker, const auto& listener) {
       return OnWay(post, speaker, listener);
@@ -82,7 +77,9 @@ class Trial {
       for (const Prank& prank :
            MakeScript(setting_.seed, setting_.pranks, Microseconds(setting_.span)))
         At(kBeginning + prank.time, [this, prank] { Do(prank); });
-      while (!chronicle_.violated() && !(plans_.empty() && Finished())) Live();
+      while (!chronicle_.violated() &&
+             !(plans_.empty() && operator_->Finished(setting_.iterations)))
+        Live();
     } catch (const std::exception& error) {
       chronicle_.Violate(7, Now(), error.what());
     }
@@ -114,25 +111,12 @@ class Trial {
     NoteEndings();
     for (; !plans_.empty() && plans_.begin()->first <= Now(); plans_.erase(plans_.begin()))
       plans_.begin()->second();
-    KeepArmed();
+    operator_->KeepArmed(Now());
     if (!plans_.empty()) calm_since_ = Now();
     if (Now() > calm_since_ + Microseconds(setting_.patience))
-      chronicle_.Violate(7, Now(), "no result: " + Situation());
-  }
-
-  std::string Situation() const {
-    return fmt::format(
-        "the driver's state is {} ({}), the controller's phase {} ({}) with policy "
-        "{}, the newest distribution {}",
-        int{drivers_->newest().state}, drivers_->newest().reason, int{controllers_->newest().phase},
-        controllers_->newest().reason, controllers_->newest().policy_iteration,
-        messages_.iteration());
-  }
-
-  bool Finished() const {
-    const controller_status_t& status = controllers_->newest();
-    return controllers_->received() > 0 && status.phase == controller_status_t::COMPLETE &&
-           status.purpose == policy_t::EVALUATE && status.policy_iteration == setting_.iterations;
+      chronicle_.Violate(7, Now(),
+                         fmt::format("no result: {}, the newest distribution {}",
+                                     operator_->Situation(), messages_.iteration()));
   }
 
   /// Whoever has ended had a reason to; it is started again.
@@ -150,22 +134,6 @@ class Trial {
         if (!stack_.runs(name)) Start(name);
       });
     }
-  }
-
-  void KeepArmed() {
-    const int8_t state = drivers_->newest().state;
-    const bool down = drivers_->received() > 0 &&
-                      (state == driver_status_t::IDLE || state == driver_status_t::FAULT);
-    if (!down || Now() < asked_ + kArmAgain) return;
-    asked_ = Now();
-    Request(driver_request_t::ARM);
-  }
-
-  void Request(int8_t what) {
-    driver_request_t request{};
-    request.utime = Now();
-    request.request = what;
-    requests_->Publish(request);
   }
 
   void Do(const Prank& prank) {
@@ -205,7 +173,8 @@ class Trial {
         coordinator_.SetClockError(whom, static_cast<int64_t>(prank.amount));
         return At(end, [this, whom] { coordinator_.SetClockError(whom, 0); });
       case Mischief::kStop:
-        return Request(prank.amount < 0.5 ? driver_request_t::DISARM : driver_request_t::ESTOP);
+        return operator_->Request(
+            Now(), prank.amount < 0.5 ? driver_request_t::DISARM : driver_request_t::ESTOP);
       case Mischief::kReplay:
       case Mischief::kGarbage:
       case Mischief::kForge:
@@ -269,12 +238,10 @@ class Trial {
   JournalWitness journal_;
   Coordinator coordinator_;
   Messenger messenger_;
-  std::optional<Publisher<driver_request_t>> requests_;
-  std::optional<Subscriber<driver_status_t>> drivers_;
-  std::optional<Subscriber<controller_status_t>> controllers_;
+  std::optional<Operator> operator_;                     // once the messenger has its identity
   std::multimap<int64_t, std::function<void()>> plans_;  // by time
   std::multiset<std::string> full_disks_;
-  int64_t asked_ = 0, calm_since_ = kBeginning;
+  int64_t calm_since_ = kBeginning;
   int played_ = 0, endings_ = 0;
   std::chrono::steady_clock::time_point real_deadline_ =
       std::chrono::steady_clock::time_point::max();

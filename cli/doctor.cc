@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <sys/resource.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -14,6 +13,7 @@
 #include "common/lcm_url.h"
 #include "common/messenger.h"
 #include "common/signature.h"
+#include "drivers/can/can_link.h"
 #include "drivers/can/transport.h"
 #include "plumb/driver_status_t.hpp"
 
@@ -96,12 +96,10 @@ Finding UdpBuffers() {
 }
 
 std::vector<Finding> Can() {
-  const int fd = socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, 1);
-  if (fd < 0) {
+  if (!KernelHasCan()) {
     return {{Level::kAdvice, "this kernel has no CAN (the udp: bus needs none)",
              "modprobe can_raw vcan   # on a kernel with CAN modules"}};
   }
-  close(fd);
   std::vector<Finding> findings;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator("/sys/class/net", error)) {

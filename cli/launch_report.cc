@@ -4,13 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 #include "calibrator/diagnostics/holdout.h"
 #include "calibrator/report/report_plots.h"
 #include "cli/run_plots.h"
 #include "common/median.h"
+#include "common/special_numbers.h"
 #include "plot/html.h"
 #include "plot/svg.h"
 
@@ -19,9 +19,7 @@ namespace {
 
 using nlohmann::json;
 
-double Real(const json& value) {
-  return value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN();
-}
+double Real(const json& value) { return value.is_number() ? value.get<double>() : kNaN; }
 
 std::vector<double> Reals(const json& values) {
   std::vector<double> reals;

@@ -64,6 +64,8 @@ class Progress {
   /// is each iteration's.
   double TrueCombination(const calibration_status_t& c, size_t index,
                          const Eigen::VectorXd& truth) const;
+  nlohmann::json Summarise(const Iteration& iteration, const Eigen::VectorXd& truth) const;
+  nlohmann::json SummariseDecisions() const;
 
   const RobotDescription& robot_;
   int iterations_;

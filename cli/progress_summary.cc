@@ -23,6 +23,50 @@ double Progress::TrueCombination(const calibration_status_t& c, size_t index,
   return involved == 1 && std::isfinite(alone) ? alone : sum;
 }
 
+nlohmann::json Progress::Summarise(const Iteration& iteration, const Eigen::VectorXd& truth) const {
+  using nlohmann::json;
+  const calibration_status_t& c = iteration.calibration;
+  json combinations = json::array();
+  for (size_t i = 0; i < c.combination.size(); ++i) {
+    combinations.push_back(
+        {{"name", c.combination[i]},
+         {"mean", c.combination_mean[i]},
+         {"sd", c.combination_sd[i]},
+         {"hidden", truth.size() > 0 ? json(TrueCombination(c, i, truth)) : json()}});
+  }
+  return {{"iteration", c.iteration},
+          {"alarm", c.alarm},
+          {"gap", c.gap},
+          {"mean", c.mean},
+          {"sd", c.sd},
+          {"combinations", combinations},
+          {"discrepancy", c.discrepancy},
+          {"prior_discrepancy", c.prior_discrepancy},
+          {"horizons", c.horizon},
+          {"error", c.error_before},
+          {"error_after", c.error_after},
+          {"error_prior", c.error_prior},
+          {"kl", c.kl},
+          {"ess", c.ess},
+          {"transitions", c.transitions},
+          {"simulated_return", iteration.simulated_return},
+          {"robot_return", iteration.robot_return},
+          {"seconds", iteration.seconds}};
+}
+
+nlohmann::json Progress::SummariseDecisions() const {
+  nlohmann::json decisions = nlohmann::json::array();
+  for (const auto& [challenger, decision] : decisions_) {
+    decisions.push_back({{"policy", challenger},
+                         {"accepted", decision.accepted},
+                         {"probability", decision.probability},
+                         {"return", decision.challenger_return},
+                         {"incumbent_return", decision.incumbent_return},
+                         {"summary", decision.text}});
+  }
+  return decisions;
+}
+
 nlohmann::json Progress::Summary(const Eigen::VectorXd& truth) const {
   using nlohmann::json;
   json summary;
@@ -33,35 +77,8 @@ nlohmann::json Progress::Summary(const Eigen::VectorXd& truth) const {
   summary["hidden"] =
       truth.size() > 0 ? json(std::vector<double>(truth.begin(), truth.end())) : json();
   summary["iterations"] = json::array();
-  for (const Iteration& iteration : done_) {
-    const calibration_status_t& c = iteration.calibration;
-    json combinations = json::array();
-    for (size_t i = 0; i < c.combination.size(); ++i) {
-      combinations.push_back(
-          {{"name", c.combination[i]},
-           {"mean", c.combination_mean[i]},
-           {"sd", c.combination_sd[i]},
-           {"hidden", truth.size() > 0 ? json(TrueCombination(c, i, truth)) : json()}});
-    }
-    summary["iterations"].push_back({{"iteration", c.iteration},
-                                     {"alarm", c.alarm},
-                                     {"gap", c.gap},
-                                     {"mean", c.mean},
-                                     {"sd", c.sd},
-                                     {"combinations", combinations},
-                                     {"discrepancy", c.discrepancy},
-                                     {"prior_discrepancy", c.prior_discrepancy},
-                                     {"horizons", c.horizon},
-                                     {"error", c.error_before},
-                                     {"error_after", c.error_after},
-                                     {"error_prior", c.error_prior},
-                                     {"kl", c.kl},
-                                     {"ess", c.ess},
-                                     {"transitions", c.transitions},
-                                     {"simulated_return", iteration.simulated_return},
-                                     {"robot_return", iteration.robot_return},
-                                     {"seconds", iteration.seconds}});
-  }
+  for (const Iteration& iteration : done_)
+    summary["iterations"].push_back(Summarise(iteration, truth));
   if (!done_.empty()) summary["identifiability"] = done_.back().calibration.identifiability;
   if (training_.incumbent >= 0) {
     summary["policy"] = {
@@ -69,15 +86,7 @@ nlohmann::json Progress::Summary(const Eigen::VectorXd& truth) const {
   } else {
     summary["policy"] = nullptr;
   }
-  summary["decisions"] = json::array();
-  for (const auto& [challenger, decision] : decisions_) {
-    summary["decisions"].push_back({{"policy", challenger},
-                                    {"accepted", decision.accepted},
-                                    {"probability", decision.probability},
-                                    {"return", decision.challenger_return},
-                                    {"incumbent_return", decision.incumbent_return},
-                                    {"summary", decision.text}});
-  }
+  summary["decisions"] = SummariseDecisions();
   summary["evaluation_returns"] = evaluation_;
   summary["dropped_episodes"] = training_.dropped_episodes;
   summary["seconds"] = {{"robot", spent_.robot},

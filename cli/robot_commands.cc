@@ -141,6 +141,87 @@ void AddKey(CLI::App& app, Action& action) {
   });
 }
 
+/// What is learnt, of which robot, and how long.
+void AddLoopFlags(CLI::App& launch, LaunchFlags& flags) {
+  launch.add_option("robot", flags.robot, "robot folder or TOML file")->capture_default_str();
+  launch.add_option("--seed", flags.seed, "of all random numbers and of the hidden robot")
+      ->check(SeedRange())
+      ->capture_default_str();
+  auto* iterations = launch.add_option("--iterations", flags.iterations, "of calibration")
+                         ->check(CLI::Range(1, 1000))
+                         ->capture_default_str();
+  auto* episodes = launch
+                       .add_option("--evaluation-episodes", flags.evaluation_episodes,
+                                   "roll-outs of the final policy")
+                       ->check(CLI::Range(1, 1000))
+                       ->capture_default_str();
+  launch
+      .add_option("--efforts", flags.efforts,
+                  "instead of the loop: play this table of `plumb excite` once, calibrate")
+      ->excludes(iterations, episodes);
+}
+
+/// Which robot it is, a virtual or a real one, by which clock it moves, and whom it obeys.
+/// @param key the flag with the key of whoever may be obeyed.
+void AddRobotAndClockFlags(CLI::App& launch, CLI::Option* key, LaunchFlags& flags) {
+  launch
+      .add_option("--bus", flags.buses,
+                  "CAN bus, e.g. socketcan:can0, of several NAME=URL; default: the robot's own")
+      ->allow_extra_args(false);
+  auto* real_time = launch.add_flag(
+      "--real-time", flags.real_time,
+      "a virtual robot by this machine's clock, as a real one; default: in virtual time");
+  launch
+      .add_option("--speed", flags.speed,
+                  "in real time the clock's scale; in virtual time at most so many times "
+                  "real time, 0 = no limit")
+      ->check(CLI::Range(0.0, 100.0));
+  AddRealtimeFlag(launch, flags.priority);
+  launch
+      .add_flag("--real", flags.real,
+                "the robot itself is on the bus: no virtual one, ask before arming")
+      ->excludes(real_time);
+  launch
+      .add_flag("--unsigned", flags.allow_unsigned,
+                "let the driver obey anybody, although LCM leaves this machine")
+      ->excludes(key);
+}
+
+/// What is recorded of it. After AddRobotAndClockFlags.
+void AddRecordingFlags(CLI::App& launch, LaunchFlags& flags) {
+  launch.add_option("--log", flags.log, "record all messages to this LCM log");
+  launch.add_flag("--overwrite", flags.overwrite,
+                  "write over a log that no run in virtual time of this robot would make again");
+  launch
+      .add_option("--can-log", flags.can_log,
+                  "in virtual time: record all frames to this file, as candump -l does")
+      ->excludes(launch.get_option("--real-time"), launch.get_option("--real"));
+}
+
+/// Who looks on.
+void AddDashboardFlags(CLI::App& launch, LaunchFlags& flags) {
+  auto* dashboard =
+      launch
+          .add_option("--dashboard", flags.dashboard,
+                      "show the run in browsers; where to listen, default: 127.0.0.1:8765")
+          ->expected(0, 1)
+          ->type_name("ADDRESS:PORT");
+  launch
+      .add_option("--origin", flags.origins,
+                  "of another page that may talk to the dashboard, as Foxglove's, "
+                  "https://app.foxglove.dev; may be repeated")
+      ->allow_extra_args(false)
+      ->needs(dashboard);
+}
+
+/// What is left of it.
+void AddOutcomeFlags(CLI::App& launch, LaunchFlags& flags) {
+  launch.add_option("--summary", flags.summary, "write the outcome to this JSON file");
+  launch.add_option("--report", flags.report, "how it went, for people: an HTML page");
+  launch.add_option("--output", flags.output,
+                    "folder for logs and checkpoints; default: a new one in runs/");
+}
+
 }  // namespace
 
 void AddLaunch(CLI::App& app, const std::string& line, Action& action) {
@@ -148,66 +229,11 @@ void AddLaunch(CLI::App& app, const std::string& line, Action& action) {
   flags->command = line;
   CLI::App* launch =
       AddCommand(app, "launch", "run the whole loop: train, roll out, calibrate, train ...");
-  launch->add_option("robot", flags->robot, "robot folder or TOML file")->capture_default_str();
-  launch->add_option("--seed", flags->seed, "of all random numbers and of the hidden robot")
-      ->check(SeedRange())
-      ->capture_default_str();
-  auto* iterations = launch->add_option("--iterations", flags->iterations, "of calibration")
-                         ->check(CLI::Range(1, 1000))
-                         ->capture_default_str();
-  auto* episodes = launch
-                       ->add_option("--evaluation-episodes", flags->evaluation_episodes,
-                                    "roll-outs of the final policy")
-                       ->check(CLI::Range(1, 1000))
-                       ->capture_default_str();
-  launch
-      ->add_option("--efforts", flags->efforts,
-                   "instead of the loop: play this table of `plumb excite` once, calibrate")
-      ->excludes(iterations, episodes);
-  launch
-      ->add_option("--bus", flags->buses,
-                   "CAN bus, e.g. socketcan:can0, of several NAME=URL; default: the robot's own")
-      ->allow_extra_args(false);
-  auto* real_time = launch->add_flag(
-      "--real-time", flags->real_time,
-      "a virtual robot by this machine's clock, as a real one; default: in virtual time");
-  launch
-      ->add_option("--speed", flags->speed,
-                   "in real time the clock's scale; in virtual time at most so many times "
-                   "real time, 0 = no limit")
-      ->check(CLI::Range(0.0, 100.0));
-  AddRealtimeFlag(*launch, flags->priority);
-  auto* real = launch
-                   ->add_flag("--real", flags->real,
-                              "the robot itself is on the bus: no virtual one, ask before arming")
-                   ->excludes(real_time);
-  launch
-      ->add_flag("--unsigned", flags->allow_unsigned,
-                 "let the driver obey anybody, although LCM leaves this machine")
-      ->excludes(app.get_option("--key"));
-  launch->add_option("--log", flags->log, "record all messages to this LCM log");
-  launch->add_flag("--overwrite", flags->overwrite,
-                   "write over a log that no run in virtual time of this robot would make again");
-  launch
-      ->add_option("--can-log", flags->can_log,
-                   "in virtual time: record all frames to this file, as candump -l does")
-      ->excludes(real_time, real);
-  auto* dashboard =
-      launch
-          ->add_option("--dashboard", flags->dashboard,
-                       "show the run in browsers; where to listen, default: 127.0.0.1:8765")
-          ->expected(0, 1)
-          ->type_name("ADDRESS:PORT");
-  launch
-      ->add_option("--origin", flags->origins,
-                   "of another page that may talk to the dashboard, as Foxglove's, "
-                   "https://app.foxglove.dev; may be repeated")
-      ->allow_extra_args(false)
-      ->needs(dashboard);
-  launch->add_option("--summary", flags->summary, "write the outcome to this JSON file");
-  launch->add_option("--report", flags->report, "how it went, for people: an HTML page");
-  launch->add_option("--output", flags->output,
-                     "folder for logs and checkpoints; default: a new one in runs/");
+  AddLoopFlags(*launch, *flags);
+  AddRobotAndClockFlags(*launch, app.get_option("--key"), *flags);
+  AddRecordingFlags(*launch, *flags);
+  AddDashboardFlags(*launch, *flags);
+  AddOutcomeFlags(*launch, *flags);
   const auto launches = [flags, launch](Process& process) {
     if (launch->count("--dashboard") > 0 && flags->dashboard.empty())
       flags->dashboard = "127.0.0.1:8765";

@@ -151,75 +151,114 @@ std::string Describe(const ReadingNoise& noise) {
   return fmt::format("readings: noise of {} on q, {} on v\n", noise.q, noise.v);
 }
 
-}  // namespace
+/// What is simulated, as the flags have it.
+struct SimSetting {
+  RobotDescription robot;
+  std::shared_ptr<const Residual> residual;  // null = none
+  ReadingNoise noise;
+  Eigen::MatrixXf played;  // what --efforts has; empty = nothing
+};
 
-int Simulate(Process& process, const SimFlags& flags) {
+SimSetting ReadSetting(const SimFlags& flags) {
   if (flags.random + !flags.policy.empty() + !flags.efforts.empty() > 1)
     throw std::invalid_argument("--policy, --efforts and --random exclude each other");
-  RobotDescription robot = LoadRobot(flags.robot);
+  SimSetting setting{LoadRobot(flags.robot), {}, {}, {}};
+  RobotDescription& robot = setting.robot;
   for (const std::string& warning : robot.warnings) spdlog::warn(warning);
   WarnOfProtocols(robot);
-  std::shared_ptr<const Residual> residual;
-  if (!flags.posterior.empty()) residual = SetMeans(flags.posterior, robot);
+  if (!flags.posterior.empty()) setting.residual = SetMeans(flags.posterior, robot);
   if (flags.urdf) robot.parameters.clear();
   for (const std::string& assignment : flags.set) Set(assignment, robot);
-  const ReadingNoise noise = ParseReadingNoise(flags.noise);
+  setting.noise = ParseReadingNoise(flags.noise);
   RequireFiles(flags, robot);
-  const Eigen::VectorXd means = Means(robot);
-  Eigen::MatrixXf played;
   if (!flags.efforts.empty()) {
-    played = ReadEffortTable(flags.efforts, robot, *MakeTask(robot));
-    robot.task.steps = static_cast<int>(played.rows());
+    setting.played = ReadEffortTable(flags.efforts, robot, *MakeTask(robot));
+    robot.task.steps = static_cast<int>(setting.played.rows());
   }
-  Environment environment(robot);
-  environment.SetParameters(means);
-  if (residual) environment.SetResidual(First(*residual, means));
+  return setting;
+}
 
-  std::cout << fmt::format("{}, task {}, {}, seed {}\n", robot.name, robot.task.name,
-                           DescribeActions(flags), flags.seed)
-            << DescribeParameters(robot)
-            << (residual ? "residual: what " + flags.posterior + " has learnt that these lack\n"
-                         : "")
-            << Describe(noise)
-            << fmt::format("{:>7}  {:>6}  {:>10}  ended by\n", "episode", "steps", "return");
-  std::string csv = CsvHeader(robot);
-  std::vector<Snapshot> film;  // of the first episode
+std::string Describe(const SimFlags& flags, const SimSetting& setting) {
+  const RobotDescription& robot = setting.robot;
+  return fmt::format("{}, task {}, {}, seed {}\n", robot.name, robot.task.name,
+                     DescribeActions(flags), flags.seed) +
+         DescribeParameters(robot) +
+         (setting.residual ? "residual: what " + flags.posterior + " has learnt that these lack\n"
+                           : "") +
+         Describe(setting.noise);
+}
+
+/// What is kept of the episodes.
+struct SimRecord {
+  std::string csv;
+  std::vector<Snapshot> film;  // of the first one
   std::vector<EpisodeSummary> episodes;
+};
+
+/// Plays one after the other, each with a line that says how it ended.
+/// @return false if the process is to stop before all have come to their end.
+bool PlayEpisodes(Process& process, const SimFlags& flags, const SimSetting& setting,
+                  Environment& environment, SimRecord& record) {
+  const RobotDescription& robot = setting.robot;
   int64_t asked = 0;
   const auto stop = [&] { return ++asked % kStepsPerLook == 0 && process.stopping(); };
-  const int64_t begin = process.clock().Now();
+  std::cout << fmt::format("{:>7}  {:>6}  {:>10}  ended by\n", "episode", "steps", "return");
   for (int number = 0; number < flags.episodes; ++number) {
     if (process.stopping()) {
       std::cout << "interrupted" << std::endl;
-      return 130;
+      return false;
     }
     Random readings(flags.seed, {static_cast<uint32_t>(number), kReadingStream});
     const auto see = [&](SimulatedStep step) {
-      if (noise.any()) noise.Add(robot, readings, step.q, step.v);
-      if (!flags.csv.empty()) AppendCsv(step, csv);
-      if (number == 0) film.push_back({step.time, step.true_q});
+      if (setting.noise.any()) setting.noise.Add(robot, readings, step.q, step.v);
+      if (!flags.csv.empty()) AppendCsv(step, record.csv);
+      if (number == 0) record.film.push_back({step.time, step.true_q});
     };
-    episodes.push_back(PlayEpisode(environment, robot,
-                                   MakeActor(flags, robot, environment.task(), played), flags.seed,
-                                   static_cast<uint32_t>(number), see, stop));
-    const EpisodeSummary& episode = episodes.back();
+    record.episodes.push_back(
+        PlayEpisode(environment, robot, MakeActor(flags, robot, environment.task(), setting.played),
+                    flags.seed, static_cast<uint32_t>(number), see, stop));
+    const EpisodeSummary& episode = record.episodes.back();
     std::cout << fmt::format("{:>7}  {:>6}  {:>10.1f}  {}", number + 1, episode.steps, episode.sum,
                              Describe(episode.end))
               << std::endl;
-    if (episode.end == EpisodeSummary::End::kInterrupted) return 130;
+    if (episode.end == EpisodeSummary::End::kInterrupted) return false;
     if (number == 0 && environment.q().allFinite())
-      film.push_back({static_cast<double>(episode.steps) * robot.task.period, environment.q()});
+      record.film.push_back(
+          {static_cast<double>(episode.steps) * robot.task.period, environment.q()});
   }
-  const double seconds =
-      std::max(Seconds(process.clock().Now() - begin) / process.clock().scale(), 1e-6);
+  return true;
+}
+
+/// @param seconds that it took.
+std::string DescribeSpeed(const std::vector<EpisodeSummary>& episodes, double period,
+                          double seconds) {
   double steps = 0;
   for (const EpisodeSummary& episode : episodes) steps += static_cast<double>(episode.steps);
-  std::cout << Totals(episodes)
-            << fmt::format("\n{:.1f} s simulated in {:.2f} s, {:.0f} steps per second\n",
-                           steps * robot.task.period, seconds, steps / seconds);
-  if (!flags.csv.empty()) WriteAtomically(flags.csv, csv);
-  if (!flags.png.empty()) WriteAtomically(flags.png, DrawStrip(robot, film));
-  if (!flags.gif.empty()) WriteAtomically(flags.gif, DrawFilm(robot, film));
+  return fmt::format("{:.1f} s simulated in {:.2f} s, {:.0f} steps per second\n", steps * period,
+                     seconds, steps / seconds);
+}
+
+}  // namespace
+
+int Simulate(Process& process, const SimFlags& flags) {
+  const SimSetting setting = ReadSetting(flags);
+  const RobotDescription& robot = setting.robot;
+  const Eigen::VectorXd means = Means(robot);
+  Environment environment(robot);
+  environment.SetParameters(means);
+  if (setting.residual) environment.SetResidual(First(*setting.residual, means));
+
+  std::cout << Describe(flags, setting);
+  SimRecord record{CsvHeader(robot), {}, {}};
+  const int64_t begin = process.clock().Now();
+  if (!PlayEpisodes(process, flags, setting, environment, record)) return 130;
+  const double seconds =
+      std::max(Seconds(process.clock().Now() - begin) / process.clock().scale(), 1e-6);
+  std::cout << Totals(record.episodes) << "\n"
+            << DescribeSpeed(record.episodes, robot.task.period, seconds);
+  if (!flags.csv.empty()) WriteAtomically(flags.csv, record.csv);
+  if (!flags.png.empty()) WriteAtomically(flags.png, DrawStrip(robot, record.film));
+  if (!flags.gif.empty()) WriteAtomically(flags.gif, DrawFilm(robot, record.film));
   return 0;
 }
 

@@ -130,8 +130,8 @@ class Training {
                                      flags_.checkpoint);
           return 130;
         }
-        if (!flags_.paper && trainer_.JudgementDue()) trainer_.Judge(sample);
-        const UpdateReport report = trainer_.Update(sample);
+        const UpdateReport report =
+            flags_.paper ? trainer_.Update(sample) : trainer_.UpdateJudged(sample);
         training_return_ = report.mean_return;
         const bool judged =
             flags_.evaluate_every > 0 && trainer_.updates() % flags_.evaluate_every == 0;
@@ -139,7 +139,8 @@ class Training {
             judged ? trainer_.Evaluate(sample, kEvaluationEpisodes).mean : NAN;
         table.Add(trainer_, report, evaluation, clock_.seconds());
         line.Show(trainer_, report, steps_, before);
-        Warn(report);
+        for (const std::string& warning : UpdateWarnings(trainer_.updates(), report))
+          spdlog::warn("{}", warning);
         if (clock_.seconds() - saved > kCheckpointPeriod) {
           Save(trainer_.state(), false);
           saved = clock_.seconds();
@@ -212,16 +213,6 @@ class Training {
     checkpoint.complete = complete, checkpoint.training_return = training_return_;
     checkpoint.distribution = distribution_.ToMessage();
     SaveCheckpoint(flags_.checkpoint, checkpoint);
-  }
-
-  void Warn(const UpdateReport& report) {
-    if (!report.step.accepted)
-      spdlog::warn(fmt::format("update {} skipped: {}", trainer_.updates(), report.step.failure));
-    if (!report.critic_fitted)
-      spdlog::warn(fmt::format("update {}: the critic's fit was not finite", trainer_.updates()));
-    if (report.dropped_episodes > 0)
-      spdlog::warn(fmt::format("update {}: {} episodes dropped, not finite", trainer_.updates(),
-                               report.dropped_episodes));
   }
 
   void Conclude(const ParameterSampler& sample, const TrainerState& last) {

@@ -56,9 +56,9 @@ if(TARGET plumbline_native)
   install(TARGETS plumbline_native LIBRARY DESTINATION ${PLUMBLINE_PYTHON_DIR}/plumbline COMPONENT python OPTIONAL)
 endif()
 
-# --- For programs of others: plumb::sim, plumb::calibrator and what they stand on ------------------------------------
+# --- For programs of others: plumb::sim, plumb::calibrator, plumb::umbridge and what they stand on -------------------
 set(libraries lcmtypes lcmtypes_c common urdf robot tasks sim plot inference motion fit diagnostics gap design results report live
-  calibrator)
+  calibrator http umbridge)
 foreach(library ${libraries} dynamics residual_kernels)
   set_target_properties(plumb_${library} PROPERTIES EXPORT_NAME ${library})
 endforeach()
@@ -68,7 +68,7 @@ target_compile_definitions(plumb_common INTERFACE $<INSTALL_INTERFACE:EIGEN_NO_C
 target_compile_options(plumb_common INTERFACE $<INSTALL_INTERFACE:-ffp-contract=off>)
 list(TRANSFORM libraries PREPEND plumb_)
 install(TARGETS ${libraries} EXPORT plumbline ARCHIVE DESTINATION ${home} COMPONENT dev INCLUDES DESTINATION include/plumbline)
-foreach(room common plot robot sim calibrator)
+foreach(room common plot robot sim calibrator http umbridge)
   install(DIRECTORY ${room} DESTINATION include/plumbline COMPONENT dev FILES_MATCHING PATTERN "*.h"
     PATTERN sim/view EXCLUDE PATTERN sim/virtual EXCLUDE)
 endforeach()

@@ -51,7 +51,7 @@ plumb_package(dashboard plumbline-dashboard SECTION science
   DEPENDS "plumbline ${this}")
 plumb_package(dev plumbline-dev SECTION libdevel
   SUMMARY "Plumbline's simulator and calibration for other programs"
-  TEXT "${what}\n.\nThis package has headers and static libraries, and a CMake package:\nfind_package(plumbline) gives plumb::sim and plumb::calibrator."
+  TEXT "${what}\n.\nThis package has headers and static libraries, and a CMake package:\nfind_package(plumbline) gives plumb::sim, plumb::calibrator\nand plumb::umbridge."
   DEPENDS "plumbline ${this}, liblcm-dev, libsodium-dev, libeigen3-dev, libfmt-dev, libspdlog-dev, nlohmann-json3-dev, libcli11-dev, \
 libboost-dev, libtinyxml-dev, libtomlplusplus-dev, librandom123-dev"
   SUGGESTS "cmake, g++")

@@ -6,9 +6,10 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <limits>
 #include <stdexcept>
 #include <unordered_set>
+
+#include "common/special_numbers.h"
 
 namespace plumb {
 namespace {
@@ -69,7 +70,7 @@ bool CsvReader::Next() {
 
 double CsvReader::Number(int column) const {
   const std::string_view text = Text(column);
-  if (text.empty()) return std::numeric_limits<double>::quiet_NaN();
+  if (text.empty()) return kNaN;
   const auto fail = [&](const char* why) {
     Fail(fmt::format("{} is {}: {}", Quoted(names_[static_cast<size_t>(column)]), Quoted(text),
                      why));

@@ -9,8 +9,8 @@ void Trial::Add(double reward, int planned) {
   if (late > 0) late_rate += (reward - late_rate) / late;
 }
 
-double Trial::WholeReturn(int episode_steps) const {
-  return sum_of_rewards + (fell ? 0 : late_rate * (episode_steps - steps));
+double Trial::Continuation(double further_steps) const {
+  return fell ? 0 : late_rate * further_steps;
 }
 
 }  // namespace plumb

@@ -11,8 +11,12 @@ struct Trial {
 
   /// Adds a control step's reward. @param planned steps of the whole trial, >= 1.
   void Add(double reward, int planned);
+  /// What would have followed at its late rate; nothing where it fell. @param further_steps >= 0
+  double Continuation(double further_steps) const;
   /// What it would have been over a whole episode at its late rate. @param episode_steps >= steps
-  double WholeReturn(int episode_steps) const;
+  double WholeReturn(int episode_steps) const {
+    return sum_of_rewards + Continuation(episode_steps - steps);
+  }
 };
 
 }  // namespace plumb

@@ -11,6 +11,7 @@
 #include "common/message_schema.h"
 #include "common/message_walk.h"
 #include "dashboard/channels.h"
+#include "dashboard/message_numbers.h"
 #include "plumb/driver_status_t.hpp"
 #include "robot/physical.h"
 
@@ -36,45 +37,6 @@ constexpr char kChannelsSchema[] =
     R"("rate":{"type":"number"},"jitter_ms":{"type":"number"},)"
     R"("bytes_per_second":{"type":"number"},"undecodable":{"type":"integer"},)"
     R"("refused":{"type":"integer"},"age_ms":{"type":"number"}}}}}})";
-
-/// The numbers by which messages are told apart, if the type has them, when it is, and what it says
-/// besides numbers.
-class Numbers : public MessageVisitor {
- public:
-  std::optional<History::Step> step() const {
-    if (!iteration_) return std::nullopt;
-    return History::Step{*iteration_, update_};
-  }
-  int64_t utime() const { return utime_; }
-  size_t words() const { return words_; }
-
- private:
-  void Field(std::string_view name) override { name_ = name; }
-  void BeginStruct() override { ++depth_; }
-  void EndStruct() override { --depth_; }
-  void BeginArray(size_t) override { name_ = {}; }
-  void EndArray() override {}
-  void Integer(int64_t value) override {
-    if (depth_ != 1) return;
-    // A controller counts policies, and the episodes of each: what each returned is not forgotten.
-    const bool policy = name_ == "policy_iteration" && value >= 0;
-    if (name_ == "iteration" || policy) iteration_ = value;
-    if (name_ == "update" || name_ == "num_episodes") update_ = value;
-    if (name_ == "utime") utime_ = value;
-    if (name_ == "state" || name_ == "phase") Word(static_cast<size_t>(value));  // names, in fact
-  }
-  void Float(float) override {}
-  void Double(double) override {}
-  void Boolean(bool value) override { Word(value); }
-  void Text(std::string_view text) override { Word(std::hash<std::string_view>()(text)); }
-  void Word(size_t hash) { words_ = words_ * 31 + hash; }
-
-  std::string_view name_;
-  int depth_ = 0;
-  std::optional<int64_t> iteration_;
-  int64_t update_ = 0, utime_ = 0;
-  size_t words_ = 0;
-};
 
 template <class Message>
 std::optional<Message> Decode(std::span<const uint8_t> bytes) {
@@ -134,7 +96,7 @@ void Gateway::OnMessage(const std::string& name, std::span<const uint8_t> messag
   using Verdict = ChannelStatistics::Verdict;
   const MessageType* const type = TypeOf(message);
   Channel* const channel = believed ? Find(name, type) : nullptr;
-  Numbers numbers;
+  MessageNumbers numbers;
   const bool good = channel && channel->type == type && WalkMessage(*type, message, numbers);
   statistics_.Add(name, type ? type->name : "", message.size(), arrival,
                   !believed ? Verdict::kRefused

@@ -8,6 +8,7 @@
 
 #include "common/special_numbers.h"
 #include "common/time_units.h"
+#include "robot/twist_angle.h"
 
 namespace plumb {
 namespace {
@@ -110,15 +111,13 @@ double BaseObserver::CreepSd(const Vector3d& direction) const {
 }
 
 double BaseObserver::AngleOf(const Eigen::Quaterniond& orientation) const {
-  const Eigen::Quaterniond turn = Eigen::Quaterniond(base_.zero.rotation).conjugate() * orientation;
-  return 2 * std::atan2(base_.axis.dot(turn.vec()), turn.w());
+  return TwistAngle(Eigen::Quaterniond(base_.zero.rotation).conjugate() * orientation, base_.axis);
 }
 
 // In a plane its turn about the joint's axis only: a wrong heading does not matter.
 Eigen::Quaterniond BaseObserver::Begun(const Eigen::Quaterniond& measured) const {
   if (base_.spatial) return measured.normalized();
-  const Eigen::Quaterniond turn = Eigen::Quaterniond(base_.zero.rotation).conjugate() * measured;
-  const Eigen::AngleAxisd about(2 * std::atan2(base_.axis.dot(turn.vec()), turn.w()), base_.axis);
+  const Eigen::AngleAxisd about(AngleOf(measured), base_.axis);
   return Eigen::Quaterniond(base_.zero.rotation * about);
 }
 

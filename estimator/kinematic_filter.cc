@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/special_numbers.h"
 #include "estimator/square.h"
 
 namespace plumb {
@@ -43,8 +44,8 @@ void KinematicFilter::Restart(double position, double velocity) {
                      Square(known ? settings_.velocity_sd : kInitialVelocitySd),
                      Square(kInitialAccelerationSd), 0, bias_variance, 0)
           .asDiagonal();
-  since_mark_ = std::numeric_limits<double>::infinity();
-  next_mark_ = std::numeric_limits<double>::quiet_NaN();
+  since_mark_ = kInfinity;
+  next_mark_ = kNaN;
   jerk_ = Square(settings_.jerk);
   step_since_ = 0;
   pending_ = 0;
@@ -73,7 +74,7 @@ void KinematicFilter::Predict(double dt, double effort_step, const ImpactSpeeds&
     mark_ = mark.of_state;
     unknown_mark = mark.variance;
     since_mark_ = next_mark_;
-    next_mark_ = std::numeric_limits<double>::quiet_NaN();
+    next_mark_ = kNaN;
   }
   since_mark_ += dt;
   const double d2 = dt * dt, d3 = d2 * dt, d4 = d3 * dt, d5 = d4 * dt;

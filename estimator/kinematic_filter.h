@@ -2,9 +2,9 @@
 
 #include <Eigen/Core>
 #include <cmath>
-#include <limits>
 #include <vector>
 
+#include "common/special_numbers.h"
 #include "estimator/impact.h"
 #include "robot/description.h"
 
@@ -69,9 +69,7 @@ class KinematicFilter {
   /// The mark is, from the next step on, where a reading of that age was made.
   void Mark(double age) { next_mark_ = age; }
   /// [s] from the mark to the present; infinite if there is none.
-  double since_mark() const {
-    return std::isnan(next_mark_) ? since_mark_ : std::numeric_limits<double>::infinity();
-  }
+  double since_mark() const { return std::isnan(next_mark_) ? since_mark_ : kInfinity; }
   /// Ends the step.
   void Keep();
 
@@ -135,8 +133,7 @@ class KinematicFilter {
   KinematicState mark_ = KinematicState::Zero();
   // of the state before it with that after it
   KinematicCovariance shared_ = KinematicCovariance::Zero();
-  double since_mark_ = std::numeric_limits<double>::infinity(),
-         next_mark_ = std::numeric_limits<double>::quiet_NaN();
+  double since_mark_ = kInfinity, next_mark_ = kNaN;
   double jerk_;               // squared spectral density of the last step's, impact included
   double step_since_ = 0;     // [s] from the effort's step in the latest interval to the present
   std::vector<Step> window_;  // ring

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 
+#include "common/time_units.h"
+
 namespace plumb {
 namespace {
 
@@ -172,9 +174,8 @@ const LegSmoother::Motion* LegSmoother::At(int64_t utime) {
   size_t earlier = count_ - 2;
   while (reading(earlier).filtered.utime > utime) --earlier;
   if (reading(earlier).filtered.utime != earlier_.utime || later_.utime == 0) Smooth(earlier);
-  const double period = 1e-6 * static_cast<double>(later_.utime - earlier_.utime);
-  const double share = 1e-6 * static_cast<double>(utime - earlier_.utime) / period,
-               ahead = share * period;
+  const double period = Seconds(later_.utime - earlier_.utime);
+  const double share = Seconds(utime - earlier_.utime) / period, ahead = share * period;
   // As if the acceleration were constant in between.
   const Vector3d change = later_.velocity - earlier_.velocity;
   const Vector3d led_to = earlier_.position + period * (earlier_.velocity + change / 2);

@@ -42,7 +42,7 @@ int main(int argc, char** argv) {
                        "these parameters: a "
                        "posterior.json, or 'nominal', the prior's means; default: without");
         plumb::AddRealtimeFlag(app, priority);
-        plumb::AddExamples(app, {"plumb-estimator robots/hopper --realtime-priority 70"});
+        plumb::AddExamples(app, {"plumb-estimator robots/hopper --realtime-priority 75"});
       },
       [&](plumb::Process& process) {
         process.BecomeFast(priority);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "common/special_numbers.h"
 #include "robot/motion_noise.h"
 
 namespace plumb {
@@ -62,9 +63,8 @@ class NoiseSearch {
     }
     for (const Parameter impact : kImpacts) LeaveOut(impact, given);
     for (size_t i = 0; i < size(); ++i) {
-      constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-      if (robot_.joints[i].passive) tuned_.joints[i].coupling = kNone;
-      if (!has_velocity_[i]) tuned_.joints[i].velocity_sd = kNone;
+      if (robot_.joints[i].passive) tuned_.joints[i].coupling = kNaN;
+      if (!has_velocity_[i]) tuned_.joints[i].velocity_sd = kNaN;
       tuned_.joints[i].delay = robot_.joints[i].noise.delay;
     }
     return std::move(tuned_);

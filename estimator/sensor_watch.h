@@ -1,7 +1,8 @@
 #pragma once
 
 #include <cmath>
-#include <limits>
+
+#include "common/special_numbers.h"
 
 namespace plumb {
 
@@ -20,7 +21,7 @@ class NisAverage {
   double value() const { return value_; }
 
  private:
-  double value_ = std::numeric_limits<double>::quiet_NaN();
+  double value_ = kNaN;
 };
 
 /// Two sensors of one motion, of a level and of its rate (position and velocity, velocity and

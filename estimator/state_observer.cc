@@ -14,8 +14,6 @@ namespace {
 // [us]; beyond it nothing is known of the motion in between
 constexpr int64_t kLongestGap = 1'000'000;
 constexpr int64_t kMaxAhead = 10'000;  // [us] of a joint's reading before the others
-constexpr int64_t kPlacing = 50'000;   // [us] until readings have told that the robot is elsewhere
-constexpr double kSurely = 5;          // standard deviations
 // [s] of a drive's velocity estimate: twice that of an ODrive as it comes
 constexpr double kVelocityLag = 4e-3;
 constexpr double kBiasesInOrder = 5;     // times its sd
@@ -111,65 +109,6 @@ StateObserver::Use StateObserver::Judge(const joint_state_t& measured) const {
   const bool late = measured.utime < state_.utime && state_.utime - measured.utime <= kLongestGap &&
                     measured.sequence < state_.sequence;
   return late ? Use::kReordered : Use::kUse;
-}
-
-void StateObserver::Place() {
-  if (started_) placed_ = state_.utime;
-}
-
-bool StateObserver::Placed(const joint_state_t& measured) const {
-  // A clock that was set back begins anew, and says nothing of what was placed before.
-  return placed_ && measured.utime >= *placed_ && measured.utime - *placed_ <= kPlacing;
-}
-
-bool StateObserver::Displaced(const joint_state_t& measured) const {
-  for (size_t i = 0; i < joints_.size(); ++i) {
-    if (!IsNew(measured, i)) continue;
-    const Joint& joint = joints_[i];
-    if (joint.used < 0) return true;  // there it is
-    if (joint.out) continue;
-    const auto innovation =
-        joint.filter.Expect(Quantity::kPosition, measured.position[i], Age(measured, i));
-    const double limit =
-        std::max(joint.settings.reset_after, kSurely * std::sqrt(innovation.variance));
-    if (std::abs(innovation.value) > limit) return true;
-  }
-  return false;
-}
-
-bool StateObserver::Back(const joint_state_t& measured) const {
-  for (size_t i = 0; i < joints_.size(); ++i) {
-    if (joints_[i].out && IsNew(measured, i)) return true;
-  }
-  return false;
-}
-
-void StateObserver::RestartAll(const joint_state_t& measured) {
-  RestartJoints(measured);
-  if (base_) base_->Restart();  // last: what waits is still smoothed
-}
-
-void StateObserver::RestartJoints(const joint_state_t& measured) {
-  while (num_waiting_ > 0) EmitSmoothed();
-  for (size_t i = 0; i < joints_.size(); ++i) {
-    Joint& joint = joints_[i];
-    const bool known = measured.valid[i];
-    // Where an invalid joint is, it will tell when it is back.
-    const double position = known                  ? measured.position[i]
-                            : joint.filter.sound() ? joint.filter.mean()(0)
-                                                   : 0;
-    joint.filter.Restart(position, known && !joint.gyro ? measured.velocity[i]
-                                                        : std::numeric_limits<double>::quiet_NaN());
-    if (std::isfinite(measured.effort_applied[i])) joint.effort = measured.effort_applied[i];
-    joint.stop = 0;
-    joint.velocity_watch.Restart();
-    joint.acceleration_watch.Restart();
-    if (known) joint.used = measured.measured[i];
-  }
-  ground_ = 0;
-  since_restart_ = 0;
-  if (started_) ++restarts_;
-  started_ = true;
 }
 
 // By how much the joints' efforts have stepped. From e0 to e1 after a share of the interval, its

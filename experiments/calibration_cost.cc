@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <stdexcept>
 
+#include "calibrator/live/calibrator.h"
 #include "experiments/budget.h"
 #include "experiments/loop.h"
 #include "experiments/n_step_error.h"
@@ -81,7 +82,7 @@ Results::Rows CalibrationCost::Errors(const PaperTask& task, CalibrationStrategy
     simopt->Begin({rollout});
     simopt->Update();
     simulated += 25 * static_cast<int64_t>(rollout.transitions.size());
-    judge(simulated, DistributionOf(*simopt, recording.robot));
+    judge(simulated, DistributionOf(recording.robot, simopt->state()));
     progress(static_cast<double>(rows.size()) / Updates(options_));
   }
   return rows;
@@ -111,7 +112,7 @@ ParameterDistribution CalibrationCost::Calibrated(CalibrationStrategy strategy, 
     simopt->Begin(some);
     simopt->Update();
   }
-  return DistributionOf(*simopt, robot);
+  return DistributionOf(robot, simopt->state());
 }
 
 // Return on the robot of a policy that went on from the first one.

@@ -67,10 +67,4 @@ ParameterDistribution FirstDistribution(CalibrationStrategy strategy, const Robo
   return distribution;
 }
 
-ParameterDistribution DistributionOf(const SimOpt& simopt, const RobotDescription& robot) {
-  const SimOpt::State& state = simopt.state();
-  return {state.iteration, robot.parameters, state.distribution,
-          state.residual,  state.explained,  Starts(state.rollouts)};
-}
-
 }  // namespace plumb

@@ -36,7 +36,4 @@ std::unique_ptr<SimOpt> MakeSimOpt(CalibrationStrategy strategy, const RobotDesc
 ParameterDistribution FirstDistribution(CalibrationStrategy strategy, const RobotDescription& robot,
                                         const Eigen::VectorXd& truth);
 
-/// SimOpt's present distribution.
-ParameterDistribution DistributionOf(const SimOpt& simopt, const RobotDescription& robot);
-
 }  // namespace plumb

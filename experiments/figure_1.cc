@@ -1,10 +1,5 @@
 // Figure 1 of "step-based SimOpt": which simulators explain a robot that is not one simulator but
-// two.
-//
-// The robot is one joint under gravity with an arm, J = 0.05 kg m^2, and a payload at 0.5 m that is
-// sometimes light and sometimes heavy: 0.8 exp(xi / 2) kg, xi = -1 in four transitions of ten and
-// +1 in six. A transition is (s, a, s'): any angle, a velocity up to 2 rad/s, 3 N m either way for
-// 50 ms, states read with noise. Given (s, a), s' is bimodal. Prior of xi: N(0, 1).
+// two: experiments/two_payloads.h. Prior of xi: N(0, 1).
 //
 //   plumb-figure-1 --output figure_1
 #include <fmt/format.h>
@@ -22,6 +17,7 @@
 #include "experiments/options.h"
 #include "experiments/population_weights.h"
 #include "experiments/provenance.h"
+#include "experiments/two_payloads.h"
 #include "plot/svg.h"
 
 namespace plumb {
@@ -29,46 +25,10 @@ namespace {
 
 using Eigen::Index, Eigen::Vector2d, Eigen::VectorXd;
 
-constexpr double kLight = -1, kHeavy = 1, kHeavyShare = 0.6;
-constexpr double kNear = 0.2;          // of a mode
-const Vector2d kNoise(0.0005, 0.015);  // sd of a next state that was read [rad, rad/s]
+constexpr double kNear = 0.2;  // of a mode
 
 // First stream words.
 constexpr uint32_t kRobot = 1, kSimulators = 2, kSimulation = 3;
-
-struct ToyTransition {
-  Vector2d state, next;
-  double effort;
-};
-
-// Angle from upright down [rad] and velocity [rad/s] after 50 ms.
-Vector2d Step(Vector2d state, double effort, double xi) {
-  constexpr double kGravity = 9.81, kLength = 0.5, kArm = 0.05, kTime = 0.05;
-  constexpr int kSubsteps = 10;
-  const double mass = 0.8 * std::exp(xi / 2), inertia = kArm + mass * kLength * kLength;
-  for (int i = 0; i < kSubsteps; ++i) {
-    state(1) +=
-        kTime / kSubsteps * (effort - mass * kGravity * kLength * std::sin(state(0))) / inertia;
-    state(0) += kTime / kSubsteps * state(1);
-  }
-  return state;
-}
-
-Vector2d Read(const Vector2d& state, Random& random) {
-  return state + kNoise.cwiseProduct(StandardNormals(2, 1, random));
-}
-
-std::vector<ToyTransition> Record(int count, uint64_t seed) {
-  std::vector<ToyTransition> transitions;
-  Random random(seed, {kRobot});
-  for (int t = 0; t < count; ++t) {
-    const Vector2d state(random.Uniform(-M_PI, M_PI), random.Uniform(-2, 2));
-    const double effort = random.Uniform() < 0.5 ? 3 : -3;
-    const double xi = t % 5 < 2 ? kLight : kHeavy;
-    transitions.push_back({state, Read(Step(state, effort, xi), random), effort});
-  }
-  return transitions;
-}
 
 /// A distribution over simulators: weighted xi.
 struct Found {
@@ -89,7 +49,7 @@ struct Found {
 Prior OfXi() { return Prior({Prior::Normal(0, 1)}); }
 
 // SimOpt's strategy: the mean squared error, and a Gaussian that searches where it is small.
-Gaussian BySquaredError(const std::vector<ToyTransition>& transitions, uint64_t seed) {
+Gaussian BySquaredError(const std::vector<PayloadTransition>& transitions, uint64_t seed) {
   RepsOptions options;
   options.returns = RepsReturns::kUnitRange;
   options.min_temperature = 0.01;
@@ -97,11 +57,11 @@ Gaussian BySquaredError(const std::vector<ToyTransition>& transitions, uint64_t 
   constexpr int kUpdates = 40;
   const auto cost = [&](const Eigen::MatrixXd& xi) {
     VectorXd costs = VectorXd::Zero(xi.cols());
-    for (const ToyTransition& t : transitions) {
+    for (const PayloadTransition& t : transitions) {
       for (Index j = 0; j < xi.cols(); ++j) {
-        const Vector2d error = Step(t.state, t.effort, xi(0, j)) - t.next;
-        costs(j) +=
-            error.cwiseQuotient(kNoise).squaredNorm() / static_cast<double>(transitions.size());
+        const Vector2d error = PayloadStep(t.state, t.effort, xi(0, j)) - t.next;
+        costs(j) += error.cwiseQuotient(kPayloadNoise).squaredNorm() /
+                    static_cast<double>(transitions.size());
       }
     }
     return costs;
@@ -110,24 +70,24 @@ Gaussian BySquaredError(const std::vector<ToyTransition>& transitions, uint64_t 
 }
 
 // Weights of draws of the prior that together predict best, in energy distance.
-Found AsPopulation(const std::vector<ToyTransition>& transitions, uint64_t seed) {
+Found AsPopulation(const std::vector<PayloadTransition>& transitions, uint64_t seed) {
   constexpr Index kCount = 200;
   Random random(seed, {kSimulators});
   const Eigen::MatrixXd xi = OfXi().Sample(kCount, random);
   std::vector<Eigen::MatrixXd> predictions;
   Eigen::MatrixXd outcomes(2, static_cast<Index>(transitions.size()));
-  for (const ToyTransition& t : transitions) {
-    outcomes.col(static_cast<Index>(predictions.size())) = t.next.cwiseQuotient(kNoise);
+  for (const PayloadTransition& t : transitions) {
+    outcomes.col(static_cast<Index>(predictions.size())) = t.next.cwiseQuotient(kPayloadNoise);
     Eigen::MatrixXd prediction(2, kCount);
     for (Index j = 0; j < kCount; ++j)
-      prediction.col(j) = Step(t.state, t.effort, xi(0, j)).cwiseQuotient(kNoise);
+      prediction.col(j) = PayloadStep(t.state, t.effort, xi(0, j)).cwiseQuotient(kPayloadNoise);
     predictions.push_back(std::move(prediction));
   }
   return {xi.row(0), FitPopulation(predictions, outcomes).weights, 0.05};
 }
 
 // The posterior of every transition alone, and all of them together.
-Found ByConditionalMixture(const std::vector<ToyTransition>& transitions, uint64_t seed,
+Found ByConditionalMixture(const std::vector<PayloadTransition>& transitions, uint64_t seed,
                            const std::function<void(double)>& progress) {
   ConditionalMixtureOptions options;
   options.simulations = 600;
@@ -138,13 +98,13 @@ Found ByConditionalMixture(const std::vector<ToyTransition>& transitions, uint64
   Found found{VectorXd(count * options.samples), {}, 0.03};
   for (Index i = 0; i < count; ++i) {
     progress(static_cast<double>(i) / static_cast<double>(count));
-    const ToyTransition& t = transitions[static_cast<size_t>(i)];
+    const PayloadTransition& t = transitions[static_cast<size_t>(i)];
     const auto simulate = [&](const Eigen::MatrixXd& xi, int64_t first) {
       Eigen::MatrixXd outcomes(2, xi.cols());
       for (Index j = 0; j < xi.cols(); ++j) {
         Random noise(seed,
                      {kSimulation, static_cast<uint32_t>(i), static_cast<uint32_t>(first + j)});
-        outcomes.col(j) = Read(Step(t.state, t.effort, xi(0, j)), noise);
+        outcomes.col(j) = ReadPayload(PayloadStep(t.state, t.effort, xi(0, j)), noise);
       }
       return outcomes;
     };
@@ -195,7 +155,7 @@ std::string Draw(const VectorXd& grid, const std::vector<Shown>& curves) {
     for (const Axis::Tick& tick : x.Ticks(8)) {
       svg.Line(x.Pixel(tick.value), bottom, x.Pixel(tick.value), top, "grid");
     }
-    for (const double mode : {kLight, kHeavy})
+    for (const double mode : {kLightPayload, kHeavyPayload})
       svg.Line(x.Pixel(mode), bottom, x.Pixel(mode), top, "truth");
     std::vector<Vector2d> points;
     points.reserve(static_cast<size_t>(grid.size()));
@@ -222,8 +182,8 @@ Results::Rows Tabulate(const VectorXd& grid, const std::function<double(double)>
 
 Results::Rows Tabulate(const VectorXd& grid, const Found& found) {
   return Tabulate(
-      grid, [&](double x) { return found.Density(x); }, found.Near(kLight), found.Near(kHeavy),
-      found.mean(), found.sd());
+      grid, [&](double x) { return found.Density(x); }, found.Near(kLightPayload),
+      found.Near(kHeavyPayload), found.mean(), found.sd());
 }
 
 Results::Rows Tabulate(const VectorXd& grid, const Gaussian& found) {
@@ -233,7 +193,8 @@ Results::Rows Tabulate(const VectorXd& grid, const Gaussian& found) {
   const auto below = [&](double x) { return 0.5 * std::erfc((mean - x) / (sd * M_SQRT2)); };
   const auto near = [&](double mode) { return below(mode + kNear) - below(mode - kNear); };
   return Tabulate(
-      grid, [&](double x) { return line.Density(x); }, near(kLight), near(kHeavy), mean, sd);
+      grid, [&](double x) { return line.Density(x); }, near(kLightPayload), near(kHeavyPayload),
+      mean, sd);
 }
 
 std::string Percent(double light, double heavy) {
@@ -241,7 +202,8 @@ std::string Percent(double light, double heavy) {
 }
 
 int MakeFigure(Process& process, const std::filesystem::path& output, uint64_t seed, bool quick) {
-  const std::vector<ToyTransition> transitions = Record(quick ? 20 : 400, seed);
+  Random random(seed, {kRobot});
+  const std::vector<PayloadTransition> transitions = RecordPayloads(quick ? 20 : 400, random);
   const VectorXd grid = VectorXd::LinSpaced(321, -2, 2);
   const Ranks ranks;
   Results results(output / "figure_1.csv",

@@ -15,6 +15,7 @@
 #include <filesystem>
 #include <iostream>
 
+#include "calibrator/live/calibrator.h"
 #include "common/atomic_file.h"
 #include "common/examples.h"
 #include "experiments/budget.h"
@@ -99,7 +100,7 @@ Results::Rows Measure(const Options& options, const Remembered& remembered, cons
       simopt->Begin({rollout});
       simopt->Update();
     }
-    distribution = DistributionOf(*simopt, robot), simulated = remembered.budget;
+    distribution = DistributionOf(robot, simopt->state()), simulated = remembered.budget;
   }
   const Eigen::VectorXd errors = NStepErrors(robot, distribution, remembered.recording.held_out,
                                              kHorizon, kSimulators, 10, seed);

@@ -20,6 +20,7 @@
 #include "common/examples.h"
 #include "common/process.h"
 #include "common/progress_line.h"
+#include "common/special_numbers.h"
 #include "common/time_units.h"
 #include "experiments/options.h"
 #include "experiments/provenance.h"
@@ -41,7 +42,7 @@ constexpr int kLastBatches = 10;
 struct Options {
   std::string robot, output = ".", distribution = "nominal";
   int seeds = 5, threads = 0;
-  double steps = 0, threshold = std::numeric_limits<double>::quiet_NaN();
+  double steps = 0, threshold = kNaN;
   bool paper = false;
 };
 
@@ -73,8 +74,7 @@ struct Curve {
   /// last.
   double At(double step) const {
     const auto above = std::lower_bound(steps.begin(), steps.end(), step);
-    if (above == steps.begin() || above == steps.end())
-      return std::numeric_limits<double>::quiet_NaN();
+    if (above == steps.begin() || above == steps.end()) return kNaN;
     const auto i = static_cast<size_t>(above - steps.begin());
     const double share = (step - steps[i - 1]) / (steps[i] - steps[i - 1]);
     return (1 - share) * Smoothed(i - 1) + share * Smoothed(i);
@@ -84,12 +84,11 @@ struct Curve {
 using Curves = std::map<int, Curve>;  // by seed
 
 Results::Rows RowsOf(const Curve& curve) {
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   Results::Rows rows;
   for (size_t i = 0; i < curve.steps.size(); ++i) {
     const bool last = i + 1 == curve.steps.size();
-    rows.push_back({curve.steps[i], curve.returns[i], last ? curve.evaluation : kNone,
-                    last ? curve.seconds : kNone});
+    rows.push_back({curve.steps[i], curve.returns[i], last ? curve.evaluation : kNaN,
+                    last ? curve.seconds : kNaN});
   }
   return rows;
 }

@@ -7,6 +7,8 @@
 #include <optional>
 #include <utility>
 
+#include "calibrator/live/calibrator.h"
+#include "common/special_numbers.h"
 #include "experiments/random_forces.h"
 #include "trainer/acceptance.h"
 #include "trainer/robot_simulation.h"
@@ -67,8 +69,7 @@ void Loop::Train(Trainer& trainer, const ParameterSampler& sample, int updates,
                  const std::function<void(double)>& progress) {
   trainer.ForgetBest();
   for (int i = 0; i < updates; ++i) {
-    if (trainer.JudgementDue()) trainer.Judge(sample);
-    trainer.Update(sample);
+    trainer.UpdateJudged(sample);
     progress(static_cast<double>(i) / updates);
   }
   if (updates > 0) trainer.ReturnToBest(sample);
@@ -157,24 +158,16 @@ class Loop::Running {
     while (!(report = simopt_->Update())) {
     }
     discrepancy_ = report->discrepancy;
-    distribution_ = DistributionOf(*simopt_, calibrated_);
+    distribution_ = DistributionOf(calibrated_, simopt_->state());
     for (Gaussian& component : distribution_.mixture.components)
       component.covariance *= settings_.tempering;
   }
 
   // Which policy is deployed from now on.
   void Choose(int iteration) {
-    const double scatter = trainer_->ScatterOfStarts(distribution_.Mean());
     if (!incumbent_) incumbent_ = trainer_->policy();
-    const auto simulated = [&](const GaussianPolicy& policy) {
-      return trainer_->EvaluateHeldOut(policy, sample_, Acceptance::kSimulators).mean;
-    };
-    const Acceptance::Decision decision =
-        distribution_.explained
-            ? acceptance_.Trust(iteration, scatter)
-            : acceptance_.Decide(iteration, scatter,
-                                 {simulated(trainer_->policy()), simulated(*incumbent_)});
-    result_.decisions.push_back(Summary(decision));
+    result_.decisions.push_back(
+        Summary(acceptance_.Choose(*trainer_, *incumbent_, iteration, distribution_)));
     if (acceptance_.incumbent() == iteration)
       deployed_ = iteration, incumbent_ = trainer_->policy();
   }
@@ -192,7 +185,7 @@ class Loop::Running {
   int deployed_ = 0;               // the iteration whose policy that is
   std::vector<Judgement> judged_;  // each iteration's policy
   int64_t transitions_ = 0;
-  double seconds_ = 0, discrepancy_ = std::numeric_limits<double>::quiet_NaN();
+  double seconds_ = 0, discrepancy_ = kNaN;
   LoopResult result_;
 };
 

@@ -11,15 +11,16 @@
 #include <cmath>
 #include <filesystem>
 #include <iostream>
-#include <limits>
 #include <map>
 
 #include "common/atomic_file.h"
 #include "common/examples.h"
 #include "common/hash.h"
 #include "common/median.h"
+#include "common/special_numbers.h"
 #include "experiments/bus_robot.h"
 #include "experiments/bus_simulation.h"
+#include "experiments/gap_comparison.h"
 #include "experiments/jobs.h"
 #include "experiments/loop.h"
 #include "experiments/options.h"
@@ -34,33 +35,6 @@ namespace {
 constexpr double kRobotSeconds = 6;   // of an iteration
 constexpr double kTrialShare = 0.75;  // of these, without exploration
 constexpr int kJudged = 10;           // episodes
-constexpr double kForces = 0.05, kTempering = 14;
-
-// Files below robots/: what is there, what is believed, what is believed with contact uncertain,
-// too.
-struct Gap {
-  const char *key, *title;
-  const char *truth, *model, *uncertain;
-};
-constexpr std::array<Gap, 10> kGaps{
-    {{"hopper", "MuJoCo's hopper", "hopper/mujoco.toml", "hopper/robot.toml",
-      "hopper/mujoco_fitted.toml"},
-     {"stiff", "ground five times stiffer", "hopper/mujoco_stiff.toml", "hopper/robot.toml",
-      "hopper/mujoco_fitted.toml"},
-     {"slippery", "slippery ground", "hopper/mujoco_slippery.toml", "hopper/robot.toml",
-      "hopper/mujoco_fitted.toml"},
-     {"slope", "a slope of 3 degrees", "hopper/mujoco_slope.toml", "hopper/robot.toml",
-      "hopper/mujoco_fitted.toml"},
-     {"simbody", "Simbody's hopper", "hopper/simbody.toml", "hopper/robot.toml",
-      "hopper/mujoco_fitted.toml"},
-     {"ode", "ODE's hopper", "hopper/ode.toml", "hopper/robot.toml", "hopper/mujoco_fitted.toml"},
-     {"worn", "worn hopper", "hopper/worn.toml", "hopper/robot.toml", "hopper/mujoco_fitted.toml"},
-     {"right", "the model itself", "hopper/robot.toml", "hopper/robot.toml",
-      "hopper/mujoco_fitted.toml"},
-     {"pendulum", "worn pendulum", "pendulum/worn.toml", "pendulum/robot.toml",
-      "pendulum/worn_fitted.toml"},
-     {"weak", "worn pendulum, weak motor", "pendulum/worn_weak.toml", "pendulum/weak.toml",
-      "pendulum/worn_fitted.toml"}}};
 
 RobotDescription Load(const std::string& robots, const std::string& file) {
   return LoadRobot((std::filesystem::path(robots) / file).string());
@@ -69,36 +43,12 @@ RobotDescription Load(const std::string& robots, const std::string& file) {
 // Whichever gaps are chosen: they share a table.
 std::vector<RobotDescription> AllRobots(const std::string& robots) {
   std::vector<RobotDescription> all;
-  for (const Gap& gap : kGaps) {
+  for (const RealityGap& gap : kRealityGaps) {
     for (const char* file : {gap.truth, gap.model, gap.uncertain})
       all.push_back(Load(robots, file));
   }
   return all;
 }
-
-struct Method {
-  const char *key, *label;
-  CalibrationStrategy strategy;
-  bool residual, accept;
-  bool uncertain = false;
-  double forces = 0, tempering = 1;
-  bool oracle = false;
-};
-// The first policy of a model is trained once for all that have it, with residuals or without.
-const std::array<Method, 10> kMethods{
-    {{"default", "Plumbline: residual and acceptance", CalibrationStrategy::kDefault, true, true},
-     {"residual", "residual without acceptance", CalibrationStrategy::kDefault, true, false},
-     {"prior", "the prior, fixed", CalibrationStrategy::kPrior, true, false},
-     {"forces", "the prior, random forces", CalibrationStrategy::kPrior, true, false, false,
-      kForces},
-     {"step", "step-based SimOpt (paper)", CalibrationStrategy::kStep, true, false},
-     {"posterior", "posterior alone", CalibrationStrategy::kDefault, false, false},
-     {"acceptance", "acceptance without residual", CalibrationStrategy::kDefault, false, true},
-     {"tempered", "tempered posterior", CalibrationStrategy::kDefault, false, false, false, 0,
-      kTempering},
-     {"wide", "the prior, contact uncertain, too", CalibrationStrategy::kPrior, true, false, true},
-     {"oracle", "oracle: TRPO on the robot itself", CalibrationStrategy::kPrior, true, false, false,
-      0, 1, true}}};
 
 struct Options : ExperimentOptions {
   int first_run = 1;
@@ -122,12 +72,12 @@ CLI::Validator OneOf(const std::array<Item, count>& all) {
   return CLI::IsMember(keys);
 }
 
-std::string KeyOf(const Gap& gap, const Method& method, int run) {
+std::string KeyOf(const RealityGap& gap, const GapMethod& method, int run) {
   return fmt::format("{},{},{}", gap.key, method.key, run);
 }
 
-std::filesystem::path DecisionsFile(const Options& options, const Gap& gap, const Method& method,
-                                    int run) {
+std::filesystem::path DecisionsFile(const Options& options, const RealityGap& gap,
+                                    const GapMethod& method, int run) {
   return std::filesystem::path(options.output) /
          fmt::format("decisions_{}_{}_{}.txt", gap.key, method.key, run);
 }
@@ -139,10 +89,10 @@ struct Remembered {
 };
 
 // The same policy in each iteration: it has no share in the loop.
-Results::Rows RunOracle(const Options& options, const Gap& gap, const RobotDescription& truth,
-                        const RobotDescription& model, const Eigen::VectorXd& hidden, uint64_t seed,
-                        BusRobot& real, const std::function<void(double)>& progress) {
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+Results::Rows RunOracle(const Options& options, const RealityGap& gap,
+                        const RobotDescription& truth, const RobotDescription& model,
+                        const Eigen::VectorXd& hidden, uint64_t seed, BusRobot& real,
+                        const std::function<void(double)>& progress) {
   const std::filesystem::path checkpoint =
       std::filesystem::path(options.output) / fmt::format("oracle_{}_{}.checkpoint", gap.key, seed);
   const Oracle oracle = TrainOracle(
@@ -154,14 +104,15 @@ Results::Rows RunOracle(const Options& options, const Gap& gap, const RobotDescr
   Results::Rows rows;
   for (int k = 0; k <= options.iterations; ++k) {
     rows.push_back({static_cast<double>(k), judged.mean, judged.worst, judged.mean, 0, judged.mean,
-                    kNone, 0, static_cast<double>(oracle.steps),
+                    kNaN, 0, static_cast<double>(oracle.steps),
                     static_cast<double>(oracle.steps) * model.task.period});
   }
   return rows;
 }
 
-Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& method, int run,
-                      Remembered& remembered, const std::function<void(double)>& progress) {
+Results::Rows RunLoop(const Options& options, const RealityGap& gap, const GapMethod& method,
+                      int run, Remembered& remembered,
+                      const std::function<void(double)>& progress) {
   const char* model_file = method.uncertain ? gap.uncertain : gap.model;
   const RobotDescription truth = Load(options.robots, gap.truth);
   RobotDescription model = Load(options.robots, model_file);
@@ -205,7 +156,7 @@ Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& meth
 
 constexpr size_t kReturn = 1, kNewest = 3, kResidual = 7;  // columns
 
-std::vector<double> Column(const Options& options, const Gap& gap, const Method& method,
+std::vector<double> Column(const Options& options, const RealityGap& gap, const GapMethod& method,
                            const Results& results, int iteration, size_t column) {
   std::vector<double> values;
   for (int run = options.first_run; run < options.first_run + options.runs; ++run)
@@ -215,8 +166,8 @@ std::vector<double> Column(const Options& options, const Gap& gap, const Method&
 }
 
 // Of each iteration the median, and a band from the worst run to the best.
-Curve CurveOf(const std::string& label, const Options& options, const Gap& gap,
-              const Method& method, const Results& results, size_t column) {
+Curve CurveOf(const std::string& label, const Options& options, const RealityGap& gap,
+              const GapMethod& method, const Results& results, size_t column) {
   Curve curve{label, {}, {}, {}, {}};
   for (int k = 0; k <= options.iterations; ++k) {
     const auto values = Column(options, gap, method, results, k, column);
@@ -226,11 +177,11 @@ Curve CurveOf(const std::string& label, const Options& options, const Gap& gap,
   return curve;
 }
 
-Chart Draw(const Options& options, const Gap& gap, const Results& results) {
+Chart Draw(const Options& options, const RealityGap& gap, const Results& results) {
   Chart chart{
       gap.title, "iterations, 6 s of the robot each", "return of the deployed policy", false, {}};
-  const std::vector<Method> methods = Chosen(kMethods, options.methods);
-  for (const Method& method : methods)
+  const std::vector<GapMethod> methods = Chosen(kGapMethods, options.methods);
+  for (const GapMethod& method : methods)
     chart.curves.push_back(CurveOf(method.label, options, gap, method, results, kReturn));
   if (methods.size() == 1 && methods[0].accept)
     chart.curves.push_back(
@@ -238,12 +189,12 @@ Chart Draw(const Options& options, const Gap& gap, const Results& results) {
   return chart;
 }
 
-std::string Table(const Options& options, const Gap& gap, const Results& results) {
+std::string Table(const Options& options, const RealityGap& gap, const Results& results) {
   std::string text = fmt::format(
       "{}, {} runs: return of the deployed policy, median (worst), after 0, 1, ... iterations; "
       "runs with a residual:",
       gap.title, options.runs);
-  for (const Method& method : Chosen(kMethods, options.methods)) {
+  for (const GapMethod& method : Chosen(kGapMethods, options.methods)) {
     text += fmt::format("\n  {:<36}", method.label);
     for (int k = 0; k <= options.iterations; ++k) {
       const auto returns = Column(options, gap, method, results, k, kReturn);
@@ -267,12 +218,12 @@ int Compare(Process& process, const Options& options) {
       {"iteration", "robot_return", "worst_episode", "newest_return", "deployed",
        "simulated_return", "discrepancy", "residual", "transitions", "robot_seconds"},
       ranks);
-  const std::vector<Gap> gaps = Chosen(kGaps, options.gaps);
+  const std::vector<RealityGap> gaps = Chosen(kRealityGaps, options.gaps);
   std::vector<Job> jobs;
   Remembered remembered;
   for (int run = options.first_run; run < options.first_run + options.runs; ++run) {
-    for (const Method& method : Chosen(kMethods, options.methods)) {
-      for (const Gap& gap : gaps) {
+    for (const GapMethod& method : Chosen(kGapMethods, options.methods)) {
+      for (const RealityGap& gap : gaps) {
         const bool hopper = std::string(gap.model).starts_with("hopper");
         jobs.push_back({KeyOf(gap, method, run), hopper ? 8.0 : 1.0, run,
                         [&, run, gap, method](const auto& progress) {
@@ -283,7 +234,7 @@ int Compare(Process& process, const Options& options) {
   }
   if (const auto status = RunJobs(process, jobs, results)) return *status;
   std::vector<Chart> charts;
-  for (const Gap& gap : gaps) {
+  for (const RealityGap& gap : gaps) {
     charts.push_back(Draw(options, gap, results));
     std::cout << Table(options, gap, results) << "\n";
   }
@@ -309,10 +260,10 @@ int main(int argc, char** argv) {
         plumb::AddIterationsFlag(app, options.iterations);
         plumb::AddCountFlag(app, "--first-run", options.first_run, "the first of the seeds");
         app.add_option("--gaps", options.gaps, "some of the robots, by their keys")
-            ->check(plumb::OneOf(plumb::kGaps))
+            ->check(plumb::OneOf(plumb::kRealityGaps))
             ->delimiter(',');
         app.add_option("--methods", options.methods, "some of the methods, by their keys")
-            ->check(plumb::OneOf(plumb::kMethods))
+            ->check(plumb::OneOf(plumb::kGapMethods))
             ->delimiter(',');
         plumb::AddExamples(
             app,

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "robot/twist_angle.h"
+
 namespace plumb {
 
 ImuMounting MountingOf(const RobotDescription& robot, int link) {
@@ -40,8 +42,8 @@ ImuMounting MountingOf(const RobotDescription& robot, int link) {
 }
 
 double ImuMounting::Angle(const Eigen::Quaterniond& link_to_world) const {
-  const Eigen::Quaterniond turn = unturned.conjugate() * link_to_world;
-  return std::remainder(2 * std::atan2(axis.dot(turn.vec()), turn.w()), 2 * std::numbers::pi);
+  return std::remainder(TwistAngle(unturned.conjugate() * link_to_world, axis),
+                        2 * std::numbers::pi);
 }
 
 }  // namespace plumb

@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "common/decompositions.h"
 #include "common/outside_text.h"
+#include "common/special_numbers.h"
 #include "robot/configuration_space.h"
 #include "robot/parameter_distribution.h"
 #include "robot/physical.h"
@@ -202,8 +202,7 @@ parameter_distribution_t ParameterDistribution::ToMessage() const {
     message.start.insert(message.start.end(), rounded.begin(), rounded.end());
   }
   message.num_starts = static_cast<int32_t>(message.start.size());
-  message.kl = message.ess = message.temperature = message.discrepancy =
-      std::numeric_limits<double>::quiet_NaN();
+  message.kl = message.ess = message.temperature = message.discrepancy = kNaN;
   return message;
 }
 

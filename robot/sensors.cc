@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
-
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
 #include "robot/description.h"
+#include "robot/roll_pitch_yaw.h"
 #include "robot/settings/ranges.h"
 
 namespace plumb {
@@ -84,10 +84,7 @@ void ReadImu(Config& config, const RobotDescription& robot, SensorDescription& s
   s.tick = config.Number("tick", {1e-9, 1}, s.tick);
   s.link = Find(config, "link", config.String("link"), robot.links, "link");
   const std::vector<double> rpy = config.Numbers("rpy", 3, {-10, 10}, std::vector<double>(3));
-  s.rotation = (Eigen::AngleAxisd(rpy[2], Eigen::Vector3d::UnitZ()) *
-                Eigen::AngleAxisd(rpy[1], Eigen::Vector3d::UnitY()) *
-                Eigen::AngleAxisd(rpy[0], Eigen::Vector3d::UnitX()))
-                   .toRotationMatrix();
+  s.rotation = FromRollPitchYaw(Eigen::Vector3d(rpy.data())).toRotationMatrix();
   s.noise.position_sd = config.Number("angle_sd", kSanePositive, kAngleSd);
   s.noise.velocity_sd = config.Number("rate_sd", kSanePositive, kRateSd);
   s.rate_bias_sd = config.Number("rate_bias_sd", {0, 1e3}, kRateBiasSd);

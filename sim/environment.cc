@@ -1,10 +1,11 @@
 #include "sim/environment.h"
 
 #include <algorithm>
-#include <limits>
 #include <span>
 #include <stdexcept>
 #include <utility>
+
+#include "common/special_numbers.h"
 
 namespace plumb {
 
@@ -138,7 +139,7 @@ StepResult Environment::End() {
     mean_effort_before_.swap(mean_effort_);
   }
   Read();
-  if (!simulator_.finite()) return {std::numeric_limits<double>::quiet_NaN(), true};
+  if (!simulator_.finite()) return {kNaN, true};
   return {task_->Reward(start_q_, start_v_, effort_, q(), v()), task_->Terminated(q(), v())};
 }
 

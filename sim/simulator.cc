@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
+
+#include "common/special_numbers.h"
 
 namespace plumb {
 namespace {
@@ -202,8 +203,8 @@ void Simulator::Take() {
   const auto near = [](const Eigen::VectorXd& x) { return (x.array().abs() < kFarthest).all(); };
   finite_ = near(q_) && near(v_);  // NaN is not
   if (finite_) return;
-  q_.setConstant(std::numeric_limits<double>::quiet_NaN());
-  v_.setConstant(std::numeric_limits<double>::quiet_NaN());
+  q_.setConstant(kNaN);
+  v_.setConstant(kNaN);
 }
 
 Simulator::State Simulator::Reading() {

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
-#include <limits>
-#include <map>
 #include <numeric>
 #include <stdexcept>
+#include <string>
 #include <thread>
+#include <utility>
+
+#include "common/special_numbers.h"
+#include "sim/window_groups.h"
 
 namespace plumb {
 namespace {
@@ -15,49 +18,7 @@ namespace {
 // Groups whose efforts are worked out together, once for all samples.
 constexpr size_t kLargestBlock = 16;
 
-// Of a window: 80 MB of efforts for six joints.
-constexpr double kMaxWindowSubsteps = 1e5;
-
-double Duration(std::span<const EffortSegment> step) {
-  return std::accumulate(step.begin(), step.end(), 0.0,
-                         [](double sum, const EffortSegment& segment) {
-                           return sum + std::max(0.0, segment.duration);
-                         });
-}
-
-void Require(const Window& window, const Model& model) {
-  const auto sized = [&](std::span<const EffortSegment> segments) {
-    return std::all_of(segments.begin(), segments.end(), [&](const EffortSegment& segment) {
-      return segment.effort.size() == model.num_velocities();
-    });
-  };
-  bool good = window.q.size() == model.num_positions() &&
-              window.v.size() == model.num_velocities() && window.q.allFinite() &&
-              window.v.allFinite() && !window.steps.empty();
-  for (const auto& step : window.before) good = good && sized(step);
-  double substeps = 0;
-  for (const auto& step : window.steps) {
-    const double duration = Duration(step);
-    good = good && sized(step) && duration > 0;
-    substeps += SubstepCount(duration, model.description().simulation.substep);
-  }
-  if (!good) {
-    throw std::invalid_argument(
-        "a window needs a finite state, and steps of some duration with efforts for all joints");
-  }
-  if (!(substeps <= kMaxWindowSubsteps))
-    throw std::invalid_argument("a window is too long to be simulated");
-}
-
 }  // namespace
-
-// As many windows as there are lanes, all with the same numbers of substeps; the last group of a
-// kind may repeat one.
-struct Windows::Group {
-  std::vector<size_t> windows;
-  std::vector<int> counts;  // substeps of each step
-  size_t used = 0;          // lanes with a window of their own
-};
 
 // One thread's engine, and the efforts of some groups, substep by substep.
 struct Windows::Worker {
@@ -79,7 +40,7 @@ struct Windows::Worker {
         q(model.num_positions()),
         v(model.num_velocities()) {}
 
-  void MakePlan(const Group& group, std::span<const Window> windows, Plan* plan) {
+  void MakePlan(const WindowGroup& group, std::span<const Window> windows, Plan* plan) {
     const auto n = static_cast<size_t>(model.num_velocities());
     const auto substeps =
         static_cast<size_t>(std::accumulate(group.counts.begin(), group.counts.end(), 0));
@@ -133,7 +94,7 @@ struct Windows::Worker {
       track.Append(segment.effort.data(), segment.duration);
   }
 
-  void Simulate(Eigen::Index sample, const Group& group, std::span<const Window> windows,
+  void Simulate(Eigen::Index sample, const WindowGroup& group, std::span<const Window> windows,
                 const Plan& plan, const Visit& visit, bool last_only) {
     const auto n = static_cast<size_t>(model.num_velocities());
     const bool sensors = model.parameters().sensor_errors();
@@ -185,13 +146,13 @@ struct Windows::Worker {
   }
 
   void Fail() {
-    q.setConstant(std::numeric_limits<double>::quiet_NaN());
-    v.setConstant(std::numeric_limits<double>::quiet_NaN());
+    q.setConstant(kNaN);
+    v.setConstant(kNaN);
   }
 
   // Samples [first, end) of these groups.
   void Run(const Eigen::MatrixXd& parameters, Eigen::Index first, Eigen::Index end,
-           std::span<const Window> windows, std::span<const Group* const> groups,
+           std::span<const Window> windows, std::span<const WindowGroup* const> groups,
            const Visit& visit, bool last_only) {
     for (size_t begin = 0; begin < groups.size(); begin += kLargestBlock) {
       const size_t size = std::min(kLargestBlock, groups.size() - begin);
@@ -215,7 +176,7 @@ struct Windows::Worker {
     }
   }
 
-  void Refuse(Eigen::Index sample, const Group& group, const Visit& visit, bool last_only) {
+  void Refuse(Eigen::Index sample, const WindowGroup& group, const Visit& visit, bool last_only) {
     for (size_t lane = 0; lane < group.used; ++lane) {
       ++failures.impossible;
       for (size_t step = last_only ? group.counts.size() - 1 : 0; step < group.counts.size();
@@ -245,33 +206,6 @@ Windows::Windows(std::shared_ptr<const Model> model, int threads) : model_(std::
 Windows::Windows(Windows&&) noexcept = default;
 Windows::~Windows() = default;
 
-std::vector<Windows::Group> Windows::Arrange(std::span<const Window> windows) const {
-  const size_t lanes = workers_[0]->lanes;
-  std::map<std::vector<int>, std::vector<size_t>> kinds;
-  for (size_t i = 0; i < windows.size(); ++i) {
-    Require(windows[i], *model_);
-    std::vector<int> counts;
-    for (const auto& step : windows[i].steps) {
-      counts.push_back(
-          static_cast<int>(SubstepCount(Duration(step), model_->description().simulation.substep)));
-    }
-    kinds[counts].push_back(i);
-  }
-  std::vector<Group> groups;
-  for (const auto& [counts, members] : kinds) {
-    for (size_t begin = 0; begin < members.size(); begin += lanes) {
-      Group group;
-      group.counts = counts;
-      group.used = std::min(lanes, members.size() - begin);
-      for (size_t lane = 0; lane < lanes; ++lane) {
-        group.windows.push_back(members[begin + std::min(lane, group.used - 1)]);
-      }
-      groups.push_back(std::move(group));
-    }
-  }
-  return groups;
-}
-
 Windows::Failures Windows::Predict(const Eigen::MatrixXd& parameters,
                                    std::span<const Window> windows, const Visit& visit,
                                    bool last_only) {
@@ -279,7 +213,7 @@ Windows::Failures Windows::Predict(const Eigen::MatrixXd& parameters,
     throw std::invalid_argument("the simulator has " + std::to_string(model_->parameters().size()) +
                                 " parameters, not " + std::to_string(parameters.rows()));
   }
-  const std::vector<Group> groups = Arrange(windows);
+  const std::vector<WindowGroup> groups = GroupWindows(windows, *model_, workers_[0]->lanes);
   const size_t count = workers_.size();
   // Every count-th group, as the long ones come last; or, where there are too few, some of the
   // samples.
@@ -288,7 +222,7 @@ Windows::Failures Windows::Predict(const Eigen::MatrixXd& parameters,
   const auto work = [&](size_t worker) {
     workers_[worker]->failures = {};
     try {
-      std::vector<const Group*> mine;
+      std::vector<const WindowGroup*> mine;
       for (size_t i = by_group ? worker : 0; i < groups.size(); i += by_group ? count : 1)
         mine.push_back(&groups[i]);
       const auto share = [&](size_t i) {

@@ -57,9 +57,7 @@ class Windows {
   const Model& model() const { return *model_; }
 
  private:
-  struct Group;
   struct Worker;
-  std::vector<Group> Arrange(std::span<const Window> windows) const;
 
   std::shared_ptr<const Model> model_;
   std::vector<std::unique_ptr<Worker>> workers_;

@@ -77,8 +77,7 @@ SYSTEM = {
     r"mpi\.h": lambda p: p == "common/ranks.cc",
     r"boost/(asio|beast)": lambda p: p.startswith("http/") or p in (
         "umbridge/server.cc",         "dashboard/server.h", "dashboard/request_answers.cc", "dashboard/viewer_connection.cc", "dashboard/main.cc"),
-    r"sys/socket\.h|netinet/|linux/can": lambda p: p.startswith(("common/", "drivers/can/", "cli/doctor"))
-    or p.endswith("main.cc"),
+    r"sys/socket\.h|netinet/|linux/can": lambda p: p.startswith(("common/", "drivers/can/")) or p.endswith("main.cc"),
 }
 
 

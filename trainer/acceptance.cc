@@ -4,8 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
+
+#include "common/special_numbers.h"
 
 namespace plumb {
 namespace {
@@ -40,9 +41,8 @@ double Acceptance::MeanReturn(int iteration) const {
   for (const Trial& trial : found->second) {
     const double left = steps_ - trial.steps;
     sum += trial.sum_of_rewards;
-    if (trial.fell) continue;
-    sum += trial.late_rate *
-           (all_falls > 0 ? ExpectedSteps(falls, all_steps / all_falls + steps, left) : left);
+    sum += trial.Continuation(
+        all_falls > 0 ? ExpectedSteps(falls, all_steps / all_falls + steps, left) : left);
   }
   return sum / static_cast<double>(found->second.size());
 }
@@ -74,19 +74,29 @@ Acceptance::Decision Acceptance::Decide(int challenger, double scatter,
 }
 
 Acceptance::Decision Acceptance::Trust(int challenger, double scatter) {
-  constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   const auto tried = [&](int iteration) { return trials_.contains(iteration); };
   Decision decision;
   decision.challenger = challenger, decision.incumbent = incumbent_;
   decision.accepted = decision.trusted = true;
-  decision.probability = decision.challenger_return = decision.incumbent_return = kUnknown;
-  decision.simulated = {kUnknown, kUnknown};
+  decision.probability = decision.challenger_return = decision.incumbent_return = kNaN;
+  decision.simulated = {kNaN, kNaN};
   if (tried(challenger)) decision.challenger_return = MeanReturn(challenger);
   if (tried(incumbent_)) decision.incumbent_return = MeanReturn(incumbent_);
   if (tried(challenger) && tried(incumbent_))
     decision.probability = Better(challenger, scatter, decision.simulated);
   incumbent_ = challenger;
   return decision;
+}
+
+Acceptance::Decision Acceptance::Choose(Trainer& trainer, const GaussianPolicy& incumbent,
+                                        int challenger, const ParameterDistribution& learnt) {
+  const double scatter = trainer.ScatterOfStarts(learnt.Mean());
+  if (learnt.explained) return Trust(challenger, scatter);
+  const auto simulated = [&](const GaussianPolicy& policy) {
+    const ParameterSampler sample = [&](Random& random) { return learnt.Draw(random); };
+    return trainer.EvaluateHeldOut(policy, sample, kSimulators).mean;
+  };
+  return Decide(challenger, scatter, {simulated(trainer.policy()), simulated(incumbent)});
 }
 
 std::string Summary(const Acceptance::Decision& d) {

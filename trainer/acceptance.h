@@ -5,7 +5,10 @@
 #include <utility>
 #include <vector>
 
+#include "controller/policy.h"
 #include "controller/trial.h"
+#include "robot/parameter_distribution.h"
+#include "trainer/trainer.h"
 
 namespace plumb {
 
@@ -66,6 +69,12 @@ class Acceptance {
   /// Makes it the incumbent whatever the trials say: where the model explains the robot, training
   /// on it is the better judge. It need not have had a trial. @param scatter as above
   Decision Trust(int challenger, double scatter);
+  /// Trusts the challenger where the simulators that were learnt since explain the robot, else
+  /// decides, with both policies' returns in kSimulators of them, those held out.
+  /// @param trainer whose policy is the challenger. @param incumbent the incumbent's policy.
+  /// @throws as Decide.
+  Decision Choose(Trainer& trainer, const GaussianPolicy& incumbent, int challenger,
+                  const ParameterDistribution& learnt);
 
   /// -1 = none yet.
   int incumbent() const { return incumbent_; }

@@ -15,6 +15,7 @@
 
 #include "common/atomic_file.h"
 #include "common/checked_file.h"
+#include "common/message_bytes.h"
 
 namespace plumb {
 namespace {
@@ -43,8 +44,7 @@ class CheckpointWriter {
   }
   template <class Message>
   void EncodedMessage(const Message& message) {
-    std::vector<char> encoded(static_cast<size_t>(message.getEncodedSize()));
-    message.encode(encoded.data(), 0, static_cast<int>(encoded.size()));
+    const std::vector<uint8_t> encoded = Encode(message);
     (*this)(static_cast<uint64_t>(encoded.size()));
     Append(encoded.data(), encoded.size());
   }

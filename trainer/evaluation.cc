@@ -9,6 +9,8 @@
 #include <numeric>
 #include <vector>
 
+#include "common/quantile.h"
+
 namespace plumb {
 namespace {
 
@@ -30,10 +32,7 @@ Evaluation Evaluate(std::span<const double> returns) {
   if (ordered.empty()) return evaluation;
   evaluation.mean =
       std::accumulate(ordered.begin(), ordered.end(), 0.) / static_cast<double>(ordered.size());
-  const double at = 0.1 * static_cast<double>(ordered.size() - 1);
-  const auto below = static_cast<size_t>(at);
-  const double above = ordered[std::min(below + 1, ordered.size() - 1)];
-  evaluation.tenth = ordered[below] + (at - std::floor(at)) * (above - ordered[below]);
+  evaluation.tenth = Quantile(ordered, 0.1);
   evaluation.worst = ordered.front();
   return evaluation;
 }

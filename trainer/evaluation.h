@@ -1,8 +1,9 @@
 #pragma once
 
-#include <limits>
 #include <span>
 #include <string>
+
+#include "common/special_numbers.h"
 
 namespace plumb {
 
@@ -11,9 +12,9 @@ struct Evaluation {
   int episodes = 0;
   int failed = 0;  ///< of these: not finite, or no simulator; left out below
   // Returns; NaN if there are none.
-  double mean = std::numeric_limits<double>::quiet_NaN();
-  double tenth = std::numeric_limits<double>::quiet_NaN();  ///< 10th percentile
-  double worst = std::numeric_limits<double>::quiet_NaN();
+  double mean = kNaN;
+  double tenth = kNaN;  ///< 10th percentile
+  double worst = kNaN;
 };
 
 /// Of returns, NaN where an episode failed. The percentile is interpolated linearly between the

@@ -162,14 +162,8 @@ class TrainerProcess {
     seconds_ = Elapsed();
     spdlog::debug("update {}: return {:.1f}, KL {:.4f}, explained variance {:.3f}",
                   session_.update(), report.mean_return, report.step.kl, report.explained_variance);
-    if (!report.step.accepted)
-      spdlog::warn("update {} skipped: {}", session_.update(), report.step.failure);
-    if (!report.critic_fitted)
-      spdlog::warn("update {}: the critic's fit was not finite", session_.update());
-    if (report.dropped_episodes > 0) {
-      spdlog::warn("update {}: {} episodes dropped, not finite", session_.update(),
-                   report.dropped_episodes);
-    }
+    for (const std::string& warning : UpdateWarnings(session_.update(), report))
+      spdlog::warn("{}", warning);
     if (past_) past_->Add(session_.Status());
   }
 

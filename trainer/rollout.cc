@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <stdexcept>
 
 #include "common/shares.h"
+#include "common/special_numbers.h"
 
 namespace plumb {
 namespace {
@@ -245,7 +245,7 @@ std::vector<double> RolloutSampler::Returns(const GaussianPolicy& policy,
   std::vector<double> returns;
   for (const EpisodeRecord& record :
        Run(policy, sample, 0, episodes, false, seed, stream, number)) {
-    returns.push_back(record.usable ? record.sum : std::numeric_limits<double>::quiet_NaN());
+    returns.push_back(record.usable ? record.sum : kNaN);
   }
   return returns;
 }
@@ -257,7 +257,7 @@ std::vector<double> RolloutSampler::WholeReturns(const GaussianPolicy& policy,
   for (const EpisodeRecord& record :
        Run(policy, sample, 0, episodes, false, seed, stream, number)) {
     const bool whole = record.usable && !record.terminated;
-    returns.push_back(whole ? record.sum : std::numeric_limits<double>::quiet_NaN());
+    returns.push_back(whole ? record.sum : kNaN);
   }
   return returns;
 }

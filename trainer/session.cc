@@ -5,14 +5,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <map>
 #include <stdexcept>
 #include <utility>
 #include <vector>
 
 #include "common/lcm_datagrams.h"
+#include "common/message_bytes.h"
 #include "common/seal.h"
+#include "common/special_numbers.h"
 #include "sim/residual_inputs.h"
 #include "sim/tasks/task.h"
 
@@ -22,14 +23,6 @@ namespace {
 constexpr int kHeldOut = 50;             // simulators
 constexpr int kTried = 20;               // of a distribution, before it is trained with
 constexpr int kTrialAndExploration = 2;  // episodes of a roll-out that begins with a trial
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-
-std::vector<uint8_t> Encoded(const ParameterDistribution& distribution) {
-  const parameter_distribution_t message = distribution.ToMessage();
-  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return bytes;
-}
 
 // What a status tells of an update.
 UpdateReport ReportOf(const training_status_t& status) {
@@ -107,7 +100,7 @@ bool TrainingSession::AddTrial(const controller_status_t& status) {
 }
 
 // The decision on the newest policy, made in an iteration.
-void TrainingSession::Choose(const Acceptance::Decision& decision, int iteration) {
+void TrainingSession::Adopt(const Acceptance::Decision& decision, int iteration) {
   decision_ = decision;
   if (!decision.accepted || decision.challenger == decision.incumbent) return;
   incumbent_policy_ = trainer_.policy();
@@ -137,18 +130,9 @@ bool TrainingSession::Begin(const ParameterDistribution& distribution) {
   if (distribution.iteration != awaited() || awaits_trial()) return false;
   if (distribution.residual) RequireResidualOf(description_, *distribution.residual);
   RequireSimulable(distribution);
-  if (complete_ && trial_steps() > 0) {
-    const double scatter = trainer_.ScatterOfStarts(distribution.Mean());
-    const auto simulated = [&](const GaussianPolicy& policy) {
-      const ParameterSampler sample = [&](Random& random) { return distribution.Draw(random); };
-      return trainer_.EvaluateHeldOut(policy, sample, Acceptance::kSimulators).mean;
-    };
-    Choose(distribution.explained
-               ? acceptance_.Trust(iteration_, scatter)
-               : acceptance_.Decide(iteration_, scatter,
-                                    {simulated(trainer_.policy()), simulated(*incumbent_policy_)}),
-           distribution.iteration);
-  }
+  if (complete_ && trial_steps() > 0)
+    Adopt(acceptance_.Choose(trainer_, *incumbent_policy_, iteration_, distribution),
+          distribution.iteration);
   distribution_ = distribution;
   iteration_ = distribution.iteration;
   begun_ = true;
@@ -161,7 +145,7 @@ bool TrainingSession::Begin(const ParameterDistribution& distribution) {
 bool TrainingSession::Replace(const ParameterDistribution& distribution) {
   if (!training() || distribution.iteration != iteration_) return false;
   if (distribution.residual) RequireResidualOf(description_, *distribution.residual);
-  if (Encoded(distribution) == Encoded(distribution_)) return false;
+  if (Encode(distribution.ToMessage()) == Encode(distribution_.ToMessage())) return false;
   RequireSimulable(distribution);
   distribution_ = distribution;
   trainer_.ForgetBest();
@@ -171,8 +155,7 @@ bool TrainingSession::Replace(const ParameterDistribution& distribution) {
 UpdateReport TrainingSession::Advance() {
   const ParameterSampler sample = [this](Random& random) { return distribution_.Draw(random); };
   if (update_ < updates()) {
-    if (trainer_.JudgementDue()) trainer_.Judge(sample);
-    last_ = trainer_.Update(sample);
+    last_ = trainer_.UpdateJudged(sample);
     ++update_;
   }
   if (update_ >= updates()) {
@@ -181,7 +164,7 @@ UpdateReport TrainingSession::Advance() {
     complete_ = true;
     // The last one has no trial: it is trusted, or nothing but one that has had a trial is run.
     if (finished() && trial_steps() > 0 && (distribution_.explained || !incumbent_policy_))
-      Choose(acceptance_.Trust(iteration_, 0), iteration_);
+      Adopt(acceptance_.Trust(iteration_, 0), iteration_);
   }
   return last_;
 }
@@ -202,17 +185,17 @@ policy_t TrainingSession::Policy(int evaluation_episodes) const {
 training_status_t TrainingSession::Status() const {
   training_status_t status;
   status.utime = 0;
-  status.seconds = kUnknown;
+  status.seconds = kNaN;
   status.iteration = iteration_;
   status.update = update_;
   status.updates = updates();
   status.steps = trainer_.steps();
   status.dropped_episodes = trainer_.dropped_episodes();
   const bool any = last_.batch > 0;  // in this run of the process
-  status.mean_return = any ? last_.mean_return : kUnknown;
-  status.kl = any ? last_.step.kl : kUnknown;
-  status.surrogate_gain = any ? last_.step.surrogate_gain : kUnknown;
-  status.explained_variance = any ? last_.explained_variance : kUnknown;
+  status.mean_return = any ? last_.mean_return : kNaN;
+  status.kl = any ? last_.step.kl : kNaN;
+  status.surrogate_gain = any ? last_.step.surrogate_gain : kNaN;
+  status.explained_variance = any ? last_.explained_variance : kNaN;
   status.entropy = Entropy(trainer_.policy());
   status.evaluation_return = evaluation_.mean;
   status.evaluation_tenth = evaluation_.tenth;
@@ -223,9 +206,9 @@ training_status_t TrainingSession::Status() const {
   const bool chosen = decision_.challenger >= 0;
   status.decision = chosen ? Summary(decision_) : "";
   status.challenger = decision_.challenger;
-  status.probability = chosen ? decision_.probability : kUnknown;
-  status.challenger_return = chosen ? decision_.challenger_return : kUnknown;
-  status.incumbent_return = chosen ? decision_.incumbent_return : kUnknown;
+  status.probability = chosen ? decision_.probability : kNaN;
+  status.challenger_return = chosen ? decision_.challenger_return : kNaN;
+  status.incumbent_return = chosen ? decision_.incumbent_return : kNaN;
   return status;
 }
 

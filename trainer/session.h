@@ -97,7 +97,7 @@ class TrainingSession {
  private:
   void RequireSimulable(const ParameterDistribution& distribution);
   int trial_steps() const;
-  void Choose(const Acceptance::Decision& decision, int iteration);
+  void Adopt(const Acceptance::Decision& decision, int iteration);
 
   RobotDescription description_;
   int iterations_;

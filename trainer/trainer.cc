@@ -52,6 +52,18 @@ TrainingSettings PaperSettings(TrainingSettings settings) {
   return settings;
 }
 
+std::vector<std::string> UpdateWarnings(int64_t update, const UpdateReport& report) {
+  std::vector<std::string> warnings;
+  if (!report.step.accepted)
+    warnings.push_back(fmt::format("update {} skipped: {}", update, report.step.failure));
+  if (!report.critic_fitted)
+    warnings.push_back(fmt::format("update {}: the critic's fit was not finite", update));
+  if (report.dropped_episodes > 0)
+    warnings.push_back(
+        fmt::format("update {}: {} episodes dropped, not finite", update, report.dropped_episodes));
+  return warnings;
+}
+
 Trainer::Trainer(const TrainingSettings& settings, const SimulationFactory& make,
                  const Eigen::VectorXd& action_scale, uint64_t seed, int threads,
                  const Ranks& ranks)
@@ -176,6 +188,11 @@ void Trainer::CompareRanks() const {
                       r, updates_, kernels::InstructionSet()));
     }
   }
+}
+
+UpdateReport Trainer::UpdateJudged(const ParameterSampler& sample) {
+  if (JudgementDue()) Judge(sample);
+  return Update(sample);
 }
 
 bool Trainer::JudgementDue() const {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "controller/policy.h"
 #include "robot/description.h"
@@ -52,6 +53,10 @@ struct UpdateReport {
   bool critic_fitted = false;     ///< false: the fit was not finite and has been undone
 };
 
+/// What an update did not do as it should, for people, a sentence each: none where all is well.
+/// @param update its number. Thread-safe.
+std::vector<std::string> UpdateWarnings(int64_t update, const UpdateReport& report);
+
 /// Trains a policy in simulation: roll out, estimate advantages, step the policy, fit the critic.
 /// Its random numbers are named by (seed, update, episode): the same bits for any number of threads
 /// and ranks, and for a run that was interrupted and resumed. Not thread-safe itself.
@@ -83,6 +88,10 @@ class Trainer {
   /// each `updates` of them: no start learns from another. @throws std::runtime_error if the
   /// simulations cannot be used, or if ranks have come to different results.
   UpdateReport Update(const ParameterSampler& sample);
+
+  /// The same, of a policy that has been judged where that was due: what training with judgements,
+  /// from which ReturnToBest chooses, is made of.
+  UpdateReport UpdateJudged(const ParameterSampler& sample);
 
   /// Whether the policy should be judged before the next update: at first, then 16 times in the
   /// `updates` of the settings, and where the next update is of another start.

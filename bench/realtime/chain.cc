@@ -7,21 +7,16 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <numbers>
-#include <regex>
-#include <sstream>
 #include <stdexcept>
 
 #include "cli/child.h"
 #include "common/clock.h"
 #include "common/messenger.h"
 #include "common/time_units.h"
-#include "controller/policy.h"
 #include "drivers/can/transport.h"
 #include "drivers/protocols/cansimple.h"
 #include "plumb/driver_request_t.hpp"
@@ -29,8 +24,6 @@
 #include "plumb/joint_command_t.hpp"
 #include "plumb/joint_state_t.hpp"
 #include "robot/description.h"
-#include "sim/tasks/task.h"
-#include "tests/legs_on_stand.h"
 
 namespace plumb {
 namespace {
@@ -41,73 +34,14 @@ constexpr double kPatience = 60;             // [s] until there must be a torque
 constexpr int64_t kLongest = 1'000'000'000;  // [ns] in which an answer is looked for
 constexpr int kAhead = 1000;                 // encoder frames in which the next state is looked for
 
-constexpr int kObservedPort = 23190;  // of the bus with the first joint's drive, where we listen
-
-std::string BusUrl(int port) { return fmt::format("udp:239.74.163.2:{}", port); }
-
-/// robots/pendulum with a millisecond for everything but control, and positions that do not repeat.
-fs::path QuickPendulum(const fs::path& source, const fs::path& folder) {
-  fs::create_directories(folder);
-  fs::copy_file(source / "robots/pendulum/robot.urdf", folder / "robot.urdf",
-                fs::copy_options::overwrite_existing);
-  std::stringstream text;
-  text << std::ifstream(source / "robots/pendulum/robot.toml").rdbuf();
-  std::string toml = text.str();
-  for (const auto& [key, value] : {std::pair{"cycle", "0.001"},
-                                   {"measurement", "0.001"},
-                                   {"substep", "0.001"},
-                                   {"period", "0.01"},
-                                   {"steps", "1000000"},
-                                   {"encoder_bits", "24"}}) {
-    toml = std::regex_replace(toml, std::regex("(^|\n)" + std::string(key) + " = [0-9.]+"),
-                              "$1" + std::string(key) + " = " + value);
-  }
-  toml = std::regex_replace(toml, std::regex("udp:[0-9.:]+"), BusUrl(kObservedPort));
-  std::ofstream(folder / "robot.toml") << toml;
-  return folder;
-}
-
-/// The robot's folder.
-fs::path Prepare(ChainRobot robot, const fs::path& source, const fs::path& folder) {
-  if (robot == ChainRobot::kPendulum) return QuickPendulum(source, folder);
-  LegsOnStand::Write(source / "robots", folder,
-                     {BusUrl(kObservedPort), BusUrl(kObservedPort + 1), BusUrl(kObservedPort + 2),
-                      BusUrl(kObservedPort + 3)});
-  return folder;
-}
-
-/// The first joint's effort as a smooth function of how it moves: no two commands of a swing are
-/// the same.
-policy_t Policy(const RobotDescription& robot) {
-  constexpr int kNeurons = 4;
-  const int observations = MakeTask(robot)->observation_size(),
-            actions = static_cast<int>(robot.driven().size());
-  GaussianPolicy policy(PolicyShape{observations, {kNeurons}, actions});
-  const Eigen::Index effort = (observations + 1) * kNeurons;  // first neuron -> first joint's
-  if (actions == 1) {
-    policy.parameters(0) = 0.5f;        // cos q -> first neuron
-    policy.parameters(kNeurons) = 1.f;  // sin q -> first neuron
-    policy.parameters(effort) = 0.5f;
-  } else {
-    // Pushed the way that it goes, it never comes to rest.
-    policy.parameters(actions * kNeurons) = 0.3f;  // first v -> first neuron
-    policy.parameters(effort) = 0.05f;
-  }
-  policy.action_scale = robot.effort_limits().cast<float>();
-  policy_t message = policy.ToMessage();
-  message.purpose = policy_t::EVALUATE;
-  message.episodes = 1000;
-  return message;
-}
-
 class Chain {
  public:
   Chain(const std::string& source, const std::string& binaries, ChainRobot robot, int priority)
       : folder_(fs::temp_directory_path() / ("plumbline_realtime_" + std::to_string(getpid()))),
-        robot_(Prepare(robot, source, folder_ / "robot")),
+        robot_(PrepareRobot(robot, source, folder_ / "robot")),
         binaries_(binaries),
         messenger_(lcm_url_),
-        bus_(OpenTransport(BusUrl(kObservedPort))),
+        bus_(OpenTransport(ObservedBus())),
         statuses_(messenger_, "DRIVER_STATUS"),
         states_(messenger_, "JOINT_STATE",
                 [this](const joint_state_t& s) {
@@ -290,7 +224,7 @@ class Chain {
   std::vector<Command> commands_heard_;
   std::vector<EncoderFrame> encoders_;
   std::vector<TorqueFrame> torques_;
-  policy_t policy_ = Policy(LoadRobot(robot_));
+  policy_t policy_ = SwingingPolicy(LoadRobot(robot_));
   int64_t encouraged_ = 0;
   int stops_ = 0;
   std::string reason_;

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "bench/realtime/chain_robot.h"
 #include "bench/realtime/floor.h"
 
 namespace plumb {
@@ -24,11 +25,6 @@ struct ChainTimes {
   int64_t superseded = 0;
   int stops = 0;       ///< times the robot had stopped and was armed again
   std::string reason;  ///< of the last one
-};
-
-enum class ChainRobot {
-  kPendulum,  ///< robots/pendulum at 1 kHz, one drive
-  kLegs,      ///< LegsOnStand: twelve drives on four buses at 500 Hz
 };
 
 /// Runs plumb-robot, plumb-driver, plumb-estimator and plumb-controller on udp: buses (control

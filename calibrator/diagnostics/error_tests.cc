@@ -6,11 +6,11 @@
 #include <boost/math/distributions/poisson.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
-#include <functional>
 #include <iterator>
 #include <limits>
 #include <utility>
 
+#include "calibrator/diagnostics/error_rows.h"
 #include "calibrator/inference/chi_squared.h"
 #include "common/decompositions.h"
 
@@ -23,43 +23,8 @@ using boost::math::complement;
 constexpr int kFewestRows = 10;
 constexpr int kLastLag = 6;
 
-// Conditions that can be told apart, else the one there is.
-std::vector<std::string> Conditions(const ProjectedErrors& errors) {
-  return errors.conditions ? std::vector<std::string>{"contact", "free"}
-                           : std::vector<std::string>{""};
-}
-
-using Rows = std::vector<Eigen::Index>;
-
-Rows Where(const ProjectedErrors& errors, const std::function<bool(int coordinate)>& which,
-           const std::string& condition, bool outliers = false) {
-  Rows rows;
-  for (Eigen::Index i = 0; i < errors.r.size(); ++i) {
-    const bool here = condition.empty() || errors.Contact(i) == (condition == "contact");
-    if (here && which(errors.coordinate[static_cast<size_t>(i)]) && (outliers || !errors.Out(i)))
-      rows.push_back(i);
-  }
-  return rows;
-}
-
-double SumOfSquares(const ProjectedErrors& errors, const Rows& rows) {
-  double sum = 0;
-  for (const Eigen::Index i : rows) sum += errors.r(i) * errors.r(i);
-  return sum;
-}
-
-std::string CoordinateName(const ProjectedErrors& errors, int coordinate) {
-  const bool speed = coordinate >= errors.n;
-  return (speed ? "speed of " : "position of ") +
-         errors.joint_of[static_cast<size_t>(speed ? coordinate - errors.n : coordinate)];
-}
-
-const std::string& Joint(const ProjectedErrors& errors, int coordinate) {
-  return errors.joint_of[static_cast<size_t>(coordinate % errors.n)];
-}
-
 // Mean of absolute errors and its variance.
-std::pair<double, double> AbsoluteMean(const ProjectedErrors& errors, const Rows& rows) {
+std::pair<double, double> AbsoluteMean(const ProjectedErrors& errors, const ErrorRows& rows) {
   double sum = 0, squares = 0;
   for (const Eigen::Index i : rows) sum += std::abs(errors.r(i));
   const auto count = static_cast<double>(rows.size());
@@ -68,13 +33,13 @@ std::pair<double, double> AbsoluteMean(const ProjectedErrors& errors, const Rows
 }
 
 // Errors in contact against free ones.
-Misfit CompareConditions(const ProjectedErrors& errors, int coordinate, const Rows& contact,
-                         const Rows& free) {
+Misfit CompareConditions(const ProjectedErrors& errors, int coordinate, const ErrorRows& contact,
+                         const ErrorRows& free) {
   const auto [contact_mean, contact_variance] = AbsoluteMean(errors, contact);
   const auto [free_mean, free_variance] = AbsoluteMean(errors, free);
   const double variance = contact_variance + free_variance;
   const double t = std::abs(contact_mean - free_mean) / std::sqrt(variance);
-  const auto of = [](double v, const Rows& rows) {
+  const auto of = [](double v, const ErrorRows& rows) {
     return v * v / static_cast<double>(rows.size() - 1);
   };
   const double freedom =
@@ -85,7 +50,7 @@ Misfit CompareConditions(const ProjectedErrors& errors, int coordinate, const Ro
   const double calm = std::min(contact_squares / c, free_squares / f);
   const char* worse = contact_squares / c > free_squares / f ? "contact" : "free";
   return {errors.Place(CoordinateName(errors, coordinate), worse) + ": larger errors than else",
-          Joint(errors, coordinate),
+          JointOf(errors, coordinate),
           worse,
           "scale",
           t,
@@ -99,7 +64,7 @@ std::vector<Misfit> TestScale(const ProjectedErrors& errors, const std::vector<b
   std::vector<Misfit> tests;
   for (int joint = 0; joint < errors.n; ++joint) {
     for (const std::string& condition : Conditions(errors)) {
-      const Rows rows = Where(
+      const ErrorRows rows = RowsWhere(
           errors,
           [&](int c) { return c % errors.n == joint && noise_known[static_cast<size_t>(c)]; },
           condition);
@@ -117,7 +82,8 @@ std::vector<Misfit> TestScale(const ProjectedErrors& errors, const std::vector<b
   for (int c = 0; c < 2 * errors.n && errors.conditions; ++c) {
     if (noise_known[static_cast<size_t>(c)]) continue;
     const auto own = [&](int other) { return other == c; };
-    const Rows contact = Where(errors, own, "contact"), free = Where(errors, own, "free");
+    const ErrorRows contact = RowsWhere(errors, own, "contact"),
+                    free = RowsWhere(errors, own, "free");
     if (contact.size() < kFewestRows || free.size() < kFewestRows) continue;
     // What rests has no errors that could be compared.
     if (SumOfSquares(errors, contact) + SumOfSquares(errors, free) == 0) continue;
@@ -131,10 +97,10 @@ std::vector<Misfit> TestOutliers(const ProjectedErrors& errors) {
   const double expected = 2 * cdf(complement(boost::math::normal(), kOutlier));
   for (int joint = 0; joint < errors.n; ++joint) {
     for (const std::string& condition : Conditions(errors)) {
-      const Rows rows = Where(
+      const ErrorRows rows = RowsWhere(
           errors, [&](int c) { return c % errors.n == joint; }, condition, /*outliers=*/true);
       if (rows.size() < kFewestRows) continue;
-      Rows out;
+      ErrorRows out;
       std::copy_if(rows.begin(), rows.end(), std::back_inserter(out),
                    [&](Eigen::Index i) { return errors.outlying[static_cast<size_t>(i)]; });
       const auto counted = std::ranges::count_if(
@@ -211,7 +177,7 @@ std::vector<Misfit> TestWhiteness(const ProjectedErrors& errors) {
       predictable += std::pow(correlation(lag), 2) - covariance(0, 0) / pairs(lag);
     }
     tests.push_back({CoordinateName(errors, c) + ": successive errors resemble each other",
-                     Joint(errors, c), "", "whiteness", statistic,
+                     JointOf(errors, c), "", "whiteness", statistic,
                      ChiSquaredTail(static_cast<double>(lags), statistic),
                      std::clamp(predictable, 0.0, 1.0)});
   }
@@ -223,7 +189,7 @@ std::vector<Misfit> TestBias(const ProjectedErrors& errors) {
   for (int c = 0; c < 2 * errors.n; ++c) {
     if (errors.quiet[static_cast<size_t>(c)]) continue;
     for (const std::string& condition : Conditions(errors)) {
-      const Rows rows = Where(
+      const ErrorRows rows = RowsWhere(
           errors, [&](int other) { return other == c; }, condition);
       if (rows.size() < kFewestRows) continue;
       Eigen::VectorXd mean = Eigen::VectorXd::Zero(errors.r.size());
@@ -233,7 +199,7 @@ std::vector<Misfit> TestBias(const ProjectedErrors& errors) {
           FindScore(errors, errors.Project(mean.cwiseProduct(errors.weight)), infinity, -infinity);
       tests.push_back(
           {errors.Place(CoordinateName(errors, c), condition) + ": errors are not zero on average",
-           Joint(errors, c), condition, "bias", score.statistic, score.p,
+           JointOf(errors, c), condition, "bias", score.statistic, score.p,
            std::min(1.0, score.gain / SumOfSquares(errors, rows))});
     }
   }
@@ -260,7 +226,7 @@ std::vector<Misfit> TestRegression(const ProjectedErrors& errors) {
   std::vector<Misfit> tests;
   for (int c = 0; c < 2 * errors.n; ++c) {
     if (errors.quiet[static_cast<size_t>(c)]) continue;
-    const Rows rows = Where(
+    const ErrorRows rows = RowsWhere(
         errors, [&](int other) { return other == c; }, "");
     if (rows.empty()) continue;
     const auto count = static_cast<Eigen::Index>(rows.size());
@@ -296,7 +262,7 @@ std::vector<Misfit> TestRegression(const ProjectedErrors& errors) {
     if (left < 1 || used == 0 || !(rest > 0)) continue;
     const double f = explained / used / (rest / left);
     tests.push_back({CoordinateName(errors, c) + ": errors depend on state and effort",
-                     Joint(errors, c), "", "structure", f,
+                     JointOf(errors, c), "", "structure", f,
                      cdf(complement(boost::math::fisher_f(used, left), f)),
                      std::clamp((explained - used * rest / left) / r.squaredNorm(), 0.0, 1.0)});
   }

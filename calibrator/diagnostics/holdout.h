@@ -2,13 +2,13 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "calibrator/fit/discrepancy.h"
+#include "common/special_numbers.h"
 #include "robot/residual.h"
 #include "sim/model.h"
 
@@ -25,13 +25,13 @@ struct HorizonError {
   double prior;      ///< of the prior's mean
   /// of the posterior's mean with the residual of the transitions that were fitted; NaN where there
   /// is none
-  double corrected = std::numeric_limits<double>::quiet_NaN();
+  double corrected = kNaN;
 };
 
 /// Discrepancy::ReplayError of the motion held out, of the posterior's and of the prior's mean.
 struct ReplayErrors {
-  double posterior = std::numeric_limits<double>::quiet_NaN();
-  double prior = std::numeric_limits<double>::quiet_NaN();
+  double posterior = kNaN;
+  double prior = kNaN;
   double seconds = 0;  ///< of the longest stretch
 };
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <tuple>
 
@@ -221,7 +220,7 @@ Identifiability FindIdentifiability(const RobotDescription& robot,
   found.information = information;
   found.cramer_rao = Eigen::VectorXd::Constant(n, kInfinity);
   if (!information.allFinite()) {
-    found.information.setConstant(std::numeric_limits<double>::quiet_NaN());
+    found.information.setConstant(kNaN);
     found.summary =
         "the simulation fails at the mean parameters, so nothing is known of what can be known";
     return found;

@@ -3,13 +3,13 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include "calibrator/diagnostics/candidates.h"
 #include "calibrator/diagnostics/projected_errors.h"
 #include "calibrator/diagnostics/witnesses.h"
 #include "calibrator/fit/curriculum.h"
+#include "calibrator/fit/estimated_noise.h"
 #include "calibrator/fit/one_step.h"
 #include "calibrator/fit/physical_columns.h"
 #include "calibrator/fit/recorded_window.h"
@@ -17,6 +17,7 @@
 #include "calibrator/inference/displaced.h"
 #include "calibrator/inference/slopes.h"
 #include "common/decompositions.h"
+#include "common/special_numbers.h"
 #include "robot/parameter_distribution.h"
 #include "sim/tasks/task.h"
 
@@ -222,7 +223,7 @@ ModelTest TestModel(const TestedFit& fit, ExecutionOptions execution, int64_t* s
 
 // The fit's errors are divided by a scale that was estimated of them: that is undone.
 double MeanSquaredError(const OneStepView& view) {
-  if (!view.noise_known) return std::numeric_limits<double>::quiet_NaN();
+  if (!view.noise_known) return kNaN;
   double squares = 0;
   for (Eigen::Index i = 0; i < view.fit.errors.size(); ++i) {
     const int coordinate = view.rows[static_cast<size_t>(i)].coordinate;

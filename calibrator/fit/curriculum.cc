@@ -1,4 +1,5 @@
 #include "calibrator/fit/curriculum.h"
+#include "calibrator/fit/estimated_noise.h"
 
 #include <fmt/format.h>
 
@@ -7,19 +8,15 @@
 #include <limits>
 #include <stdexcept>
 
+#include "calibrator/fit/mode_search.h"
 #include "calibrator/fit/recorded_window.h"
 #include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/inference/noise.h"
 #include "common/decompositions.h"
-#include "common/random.h"
 
 namespace plumb {
 namespace {
 
-constexpr int64_t kSearchWindows = 40;  // the shortest, that are enough to find a mode
-constexpr double kSameMode = 4;         // [sd] between two answers that count as one
-// [nat] by which another mode may explain the transitions worse
-constexpr double kWorthless = 12;
 constexpr int kNoiseRounds = 4;        // until the noise of beginnings and ends agrees
 constexpr double kGrownNoise = 1.15;   // of a stage, relative to the first one's
 constexpr double kLargestShift = 3.5;  // [sd] of a mode from one stage to the next
@@ -39,7 +36,7 @@ class Curriculum {
     WindowErrors one_step(model_, rollouts_, shortest_, options_.execution);
     result_.noise_known = one_step.noise_known();
     result_.rows = one_step.rows();
-    std::vector<Eigen::VectorXd> guesses = Search(FirstGuesses(start), one_step);
+    const std::vector<Eigen::VectorXd> guesses = Search(start, one_step.windows());
     std::vector<LaplaceFit> modes;
     Eigen::VectorXd noise;  // that the best mode's errors are whitened by
     double best = -std::numeric_limits<double>::infinity();
@@ -54,7 +51,7 @@ class Curriculum {
       if (modes.back().log_posterior <= best) continue;
       best = modes.back().log_posterior;
       noise = one_step.noise_sd();
-      result_.noise_sd = NoiseOf(one_step, modes.back());
+      result_.noise_sd = EstimatedNoise(one_step, modes.back());
     }
     if (noise.size() == 0)
       throw std::invalid_argument("the errors are so great that none explains them better");
@@ -64,13 +61,13 @@ class Curriculum {
     });
     for (size_t i = 1; i < modes.size(); ++i) {
       if (modes[i].log_posterior > modes[0].log_posterior - kWorthless &&
-          Differs(modes[i], modes[0])) {
+          AreDistinct(modes[i], modes[0])) {
         result_.others.push_back(std::move(modes[i]));
       }
     }
     result_.fit = std::move(modes[0]);
     result_.one_step = result_.fit;
-    first_errors_ = Whitened(one_step, result_.fit).cwiseProduct(one_step.EndNoise());
+    first_errors_ = RootMeanSquares(one_step, result_.fit).cwiseProduct(one_step.EndNoise());
     Record(one_step, result_.fit, shortest_);
     // Where one step leaves nothing to explain, more can teach nothing.
     const bool exact = (result_.fit.scale.array() <= Noise::kLeastScale).all();
@@ -90,70 +87,24 @@ class Curriculum {
   }
 
  private:
-  std::vector<Eigen::VectorXd> FirstGuesses(const Eigen::VectorXd& start) const {
-    std::vector<Eigen::VectorXd> guesses{start};
-    if (start.size() == 0) guesses[0] = prior_.FromStandard(Eigen::VectorXd::Zero(prior_.size()));
-    for (int i = 1; i < options_.starts; ++i) {
-      Random random(options_.seed, {0x57a57, static_cast<uint32_t>(i)});
-      guesses.push_back(prior_.Sample(1, random));
+  // Modes that several first guesses lead to; the best explanation first.
+  // @param windows of the shortest there are.
+  std::vector<Eigen::VectorXd> Search(const Eigen::VectorXd& start, int64_t windows) {
+    const std::vector<Eigen::VectorXd> guesses =
+        FirstGuesses(prior_, options_.starts, options_.seed, start);
+    FoundModes found = SearchModes(
+        model_, rollouts_, shortest_, windows, guesses, options_.execution, [&](size_t led) {
+          options_.progress("first guesses",
+                            0.3 * static_cast<double>(led) / static_cast<double>(guesses.size()));
+        });
+    if (found.impossible > 0) {
+      result_.warnings.push_back(fmt::format("{} of {} first guesses could not be simulated",
+                                             found.impossible, guesses.size()));
     }
-    return guesses;
-  }
-
-  // Modes that the guesses lead to on a part of the transitions; the best explanation first.
-  std::vector<Eigen::VectorXd> Search(const std::vector<Eigen::VectorXd>& guesses,
-                                      const WindowErrors& all) {
-    const auto every = static_cast<int>(std::max<int64_t>(1, all.windows() / kSearchWindows));
-    LaplaceOptions quick;
-    quick.sandwich = quick.robust = quick.jacobian_at_end = false;
-    quick.tolerance = 0.3;
-    std::vector<LaplaceFit> found;
-    int impossible = 0;
-    std::string last_error = "no first guess can be simulated";
-    for (const Eigen::VectorXd& guess : guesses) {
-      WindowErrors part(model_, rollouts_, shortest_, options_.execution, every);
-      try {
-        part.Linearise(robot_.ToPhysical(guess));
-        found.push_back(FitLaplace(ProblemOf(robot_, part), guess, quick));
-        found.back().log_posterior -= part.LogSpread();
-        simulations_ += found.back().simulations;
-      } catch (const std::invalid_argument& error) {
-        last_error = error.what();
-        ++impossible;
-      }
-      Account(part);
-      // nothing is left to explain
-      if (!found.empty() && (found.back().scale.array() <= Noise::kLeastScale).all()) break;
-      options_.progress("first guesses", 0.3 * static_cast<double>(found.size()) /
-                                             static_cast<double>(guesses.size()));
-    }
-    if (found.empty()) throw std::invalid_argument(last_error);
-    if (impossible > 0) {
-      result_.warnings.push_back(
-          fmt::format("{} of {} first guesses could not be simulated", impossible, guesses.size()));
-    }
-    std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) {
-      return a.log_posterior > b.log_posterior;
-    });
-    // With a part of the evidence the difference is that much smaller.
-    const double share = static_cast<double>(every);
-    std::vector<Eigen::VectorXd> modes;
-    std::vector<const LaplaceFit*> kept;
-    for (const LaplaceFit& fit : found) {
-      if (fit.log_posterior < found[0].log_posterior - std::max(3.0, kWorthless / share)) continue;
-      if (std::any_of(kept.begin(), kept.end(),
-                      [&](const LaplaceFit* other) { return !Differs(fit, *other); }))
-        continue;
-      kept.push_back(&fit);
-      modes.push_back(fit.mode);
-    }
-    return modes;
-  }
-
-  static bool Differs(const LaplaceFit& a, const LaplaceFit& b) {
-    const Eigen::VectorXd offset = a.standard.mean - b.standard.mean;
-    const Eigen::MatrixXd spread = a.standard.covariance + b.standard.covariance;
-    return std::sqrt(offset.dot(spread.llt().solve(offset))) > kSameMode;
+    simulations_ += found.simulations;
+    result_.simulated_steps += found.simulated_steps;
+    result_.failures += found.failures;
+    return std::move(found.modes);
   }
 
   // Fits until the sensitivity to the initial states, and the noise that both ends share, are those
@@ -174,23 +125,11 @@ class Curriculum {
               0.1 &&
           (errors.noise_known() || (fit.scale.array().log().abs() < 0.05).all());
       if (settled || round + 1 == rounds) break;
-      if (!errors.noise_known()) errors.set_noise_sd(Scaled(errors.noise_sd(), fit));
+      if (!errors.noise_known()) errors.set_noise_sd(ScaledNoise(errors.noise_sd(), fit));
     }
     // of the errors themselves, whatever they were whitened by
     fit.log_posterior -= errors.LogSpread();
     return fit;
-  }
-
-  // The noise by the errors' scale: that times the recorded noise, or the assumed one.
-  static Eigen::VectorXd NoiseOf(const WindowErrors& errors, const LaplaceFit& fit) {
-    return Scaled(errors.EndNoise(), fit);
-  }
-
-  // There is no scale of what was never observed.
-  static Eigen::VectorXd Scaled(Eigen::VectorXd noise, const LaplaceFit& fit) {
-    for (Eigen::Index c = 0; c < std::min(noise.size(), fit.scale.size()); ++c)
-      noise(c) *= std::max(fit.scale(c), 1e-150);
-    return noise;
   }
 
   static Eigen::VectorXd RowScale(const WindowErrors& errors, const LaplaceFit& fit) {
@@ -235,22 +174,10 @@ class Curriculum {
     return true;
   }
 
-  // Root mean square error of each entry of (q, v), in units of the noise as it is assumed.
-  static Eigen::VectorXd Whitened(const WindowErrors& errors, const LaplaceFit& fit) {
-    Eigen::VectorXd squares = Eigen::VectorXd::Zero(Eigen::Index{2} * errors.num_velocities()),
-                    rows = squares;
-    for (Eigen::Index i = 0; i < fit.errors.size(); ++i) {
-      const int c = errors.rows()[static_cast<size_t>(i)].coordinate;
-      squares(c) += std::pow(fit.errors(i) * fit.scale(c), 2);
-      rows(c) += 1;
-    }
-    return squares.cwiseQuotient(rows.cwiseMax(1)).cwiseSqrt();
-  }
-
   // Largest ratio of an entry's errors to what they were at first, less what chance may have made
   // of it.
   double GrownNoise(const WindowErrors& errors, const LaplaceFit& fit) const {
-    const Eigen::VectorXd noise = Whitened(errors, fit).cwiseProduct(errors.EndNoise());
+    const Eigen::VectorXd noise = RootMeanSquares(errors, fit).cwiseProduct(errors.EndNoise());
     Eigen::VectorXd rows = Eigen::VectorXd::Zero(noise.size());
     for (const WindowErrors::Row& row : errors.rows()) rows(row.coordinate) += 1;
     double grown = 0;
@@ -275,7 +202,7 @@ class Curriculum {
   void Record(const WindowErrors& errors, const LaplaceFit& fit, int horizon) {
     // Relative to the noise as recorded or, where nobody knows it, to that of one step.
     const Eigen::VectorXd relative =
-        NoiseOf(errors, fit)
+        EstimatedNoise(errors, fit)
             .cwiseQuotient(result_.noise_known ? errors.EndNoise() : result_.noise_sd);
     double squares = 0;
     for (Eigen::Index i = 0; i < fit.errors.size(); ++i) {
@@ -313,19 +240,6 @@ class Curriculum {
 CurriculumFit FitCurriculum(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts,
                             const CurriculumOptions& options, const Eigen::VectorXd& start) {
   return Curriculum(std::move(model), rollouts, options).Run(start);
-}
-
-bool LeavesRounding(const Eigen::VectorXd& noise_sd, const Eigen::VectorXd& units,
-                    std::span<const WindowErrors::Row> rows, const Eigen::VectorXd& errors) {
-  constexpr double kBeyond = 5, kHardlyAny = 0.01;
-  if ((noise_sd.array() > kNegligible * units.array()).any()) return false;
-  double beyond = 0;
-  for (size_t i = 0; i < rows.size(); ++i) {
-    const int c = rows[i].coordinate;
-    const double error = std::abs(errors(static_cast<Eigen::Index>(i))) * noise_sd(c);
-    beyond += error > kBeyond * kNegligible * units(c);
-  }
-  return beyond <= kHardlyAny * static_cast<double>(rows.size());
 }
 
 }  // namespace plumb

@@ -16,9 +16,6 @@ namespace plumb {
 
 // Thread-safe, but for errors that two threads would share; threads as ExecutionOptions says.
 
-/// Of the units of the state (Task::state_scale): an error that nobody needs to explain.
-inline constexpr double kNegligible = 1e-5;
-
 struct CurriculumOptions {
   std::vector<int> horizons{1, 5, 10, 50};  ///< control steps of each stage's windows, increasing
   /// first guesses: the prior's mean, and draws of the prior
@@ -70,12 +67,5 @@ struct CurriculumFit {
 /// simulated.
 CurriculumFit FitCurriculum(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts,
                             const CurriculumOptions& options, const Eigen::VectorXd& start = {});
-
-/// Whether what a fit has left is rounding: noise of kNegligible at most, and hardly an error
-/// beyond five times that, as the noise's robust estimate may be that of the smaller errors alone.
-/// @param noise_sd of each entry of (q, v). @param units Task::state_scale. @param rows of the
-/// errors. @param errors whitened.
-bool LeavesRounding(const Eigen::VectorXd& noise_sd, const Eigen::VectorXd& units,
-                    std::span<const WindowErrors::Row> rows, const Eigen::VectorXd& errors);
 
 }  // namespace plumb

@@ -75,6 +75,7 @@ class Discrepancy {
   Stretches WholeStretches(std::span<const Rollout> rollouts) const;
   Eigen::VectorXd ReplayErrorHere(const Eigen::MatrixXd& parameters,
                                   std::span<const Rollout> rollouts);
+  static Eigen::VectorXd ColumnSums(const Eigen::MatrixXd& values);
   void OneStep(std::span<const Rollout> rollouts, std::vector<Window>* windows, Ends* ends) const;
   void Predict(const Eigen::MatrixXd& parameters, std::span<const Window> windows,
                const Windows::Visit& visit, bool last_only = true);

@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "calibrator/fit/curriculum.h"
+#include "common/special_numbers.h"
 
 namespace plumb {
 
@@ -46,7 +46,7 @@ struct MethodResult {
   Eigen::VectorXd noise_sd;   ///< of each entry of (q, v), physical units; empty = not estimated
   std::optional<CurriculumFit> curriculum;  ///< of laplace, and of what begins with it
   /// effective size of the samples it rests on; NaN = on none
-  double ess = std::numeric_limits<double>::quiet_NaN();
+  double ess = kNaN;
   std::string check;  ///< how the shape was verified, in words
   std::vector<std::string> warnings;
   int64_t simulated_steps = 0, failures = 0;

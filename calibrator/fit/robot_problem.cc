@@ -1,12 +1,12 @@
 #include "calibrator/fit/robot_problem.h"
 
 #include <cmath>
-#include <limits>
 #include <memory>
 
 #include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/inference/distances.h"
 #include "common/decompositions.h"
+#include "common/special_numbers.h"
 
 namespace plumb {
 namespace {
@@ -84,7 +84,7 @@ Problem ByDistance(const std::shared_ptr<const LeastSquares>& problem, const Eig
               const double d = simulated.col(j).allFinite()
                                    ? distance(AsSet(*problem, dimension, simulated.col(j)))
                                    : NAN;
-              distances(0, j) = std::isfinite(d) ? d : std::numeric_limits<double>::quiet_NaN();
+              distances(0, j) = std::isfinite(d) ? d : kNaN;
             }
             return distances;
           }};

@@ -2,17 +2,12 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
-#include "calibrator/fit/physical_columns.h"
 #include "calibrator/fit/recorded_window.h"
-#include "calibrator/fit/robot_least_squares.h"
-#include "calibrator/fit/whitening.h"
 #include "calibrator/fit/window_errors.h"
-#include "calibrator/inference/laplace.h"
 #include "calibrator/inference/slopes.h"
 
 namespace plumb {
@@ -32,15 +27,12 @@ constexpr double kNoiseOff = 0.05;  // relative
 }  // namespace
 
 StreamingLaplace::StreamingLaplace(std::shared_ptr<const Model> model)
-    : model_(std::move(model)),
-      prior_(PriorOf(model_->description())),
-      windows_(model_, 1),
-      space_(model_->description()),
-      n_(model_->num_velocities()),
-      p_(prior_.size()),
+    : errors_(std::move(model)),
+      n_(errors_.model().num_velocities()),
+      p_(errors_.prior().size()),
       mode_(Eigen::VectorXd::Zero(p_)),
       precision_(Eigen::MatrixXd::Identity(p_, p_)),
-      noise_sd_(GuessedNoise(model_->description())),
+      noise_sd_(GuessedNoise(errors_.model().description())),
       scale_(Eigen::VectorXd::Ones(2 * n_)),
       sums_(static_cast<int>(2 * n_), mode_),
       next_sums_(sums_) {}
@@ -51,27 +43,17 @@ bool StreamingLaplace::Add(const Transition& transition, int64_t episode) {
     rollouts_.push_back({episode, 0, {}});
   auto& transitions = rollouts_.back().transitions;
   transitions.push_back(transition);
-  Piece piece{rollouts_.size() - 1,
-              transitions.size() - 1,
-              {},
-              !(StartSd(transition).array() == 0).all(),
-              -1,
-              {},
-              {}};
-  int unknown = 0;
-  for (int c = 0; c < static_cast<int>(2 * n_); ++c) {
-    if (!IsObserved(space_, transition, c)) continue;
-    piece.coordinates.push_back(c);
-    unknown += !(EndSd(transition, c) > 0);
-  }
-  pieces_.push_back(std::move(piece));
+  pieces_.push_back({errors_.Observe(rollouts_, rollouts_.size() - 1, transitions.size() - 1)});
+  const std::vector<int>& observed = pieces_.back().transition.coordinates;
+  const auto unknown = std::count_if(observed.begin(), observed.end(),
+                                     [&](int c) { return !(EndSd(transition, c) > 0); });
   ++left_out_;
   std::vector<size_t> indices{pieces_.size() - 1};
   indices.insert(indices.end(), turns.begin(), turns.end());
   const auto count_turns = [&] {
     for (const size_t i : turns) {
       if (pieces_[i].at.size() > 0)
-        next_sums_.Add(pieces_[i].coordinates, pieces_[i].errors, pieces_[i].at);
+        next_sums_.Add(pieces_[i].transition.coordinates, pieces_[i].errors, pieces_[i].at);
     }
   };
   try {
@@ -88,7 +70,7 @@ bool StreamingLaplace::Add(const Transition& transition, int64_t episode) {
   if (next_ + 1 == pieces_.size()) turns.push_back(next_++);
   count_turns();
   unknown_rows_ += unknown;
-  uncertain_starts_ += pieces_.back().start_uncertain;
+  uncertain_starts_ += pieces_.back().transition.start_uncertain;
   Solve();
   return pieces_.back().at.size() > 0;
 }
@@ -107,12 +89,12 @@ std::vector<size_t> StreamingLaplace::NextInTurn() {
        looked < kLookedAt && turns.size() < kLinearisedAgain && next_ < pieces_.size();
        ++looked, ++next_) {
     const Piece& piece = pieces_[next_];
-    if (piece.coordinates.empty()) continue;
+    if (piece.transition.coordinates.empty()) continue;
     const bool stale = piece.at.size() == 0 || piece.noise_version != noise_version_;
     if (stale || DistanceFrom(piece.at) > kUnmoved)
       turns.push_back(next_);
     else
-      next_sums_.Add(piece.coordinates, piece.errors, piece.at);
+      next_sums_.Add(piece.transition.coordinates, piece.errors, piece.at);
   }
   return turns;
 }
@@ -123,131 +105,25 @@ double StreamingLaplace::DistanceFrom(const Eigen::VectorXd& at) const {
   return std::sqrt(offset.dot(precision_ * offset));
 }
 
-const Transition& StreamingLaplace::TransitionOf(const Piece& piece) const {
-  return rollouts_[piece.rollout].transitions[piece.transition];
-}
-
-// States at the windows' ends, 2 n rows for each window; NaN where the simulation fails.
-// @param indices of the pieces that they are, each of so many windows one after the other.
-Eigen::MatrixXd StreamingLaplace::Predict(const Eigen::MatrixXd& standard,
-                                          const std::vector<Window>& windows,
-                                          const std::vector<size_t>& indices) {
-  const size_t each = windows.size() / std::max<size_t>(1, indices.size());
-  const Eigen::MatrixXd physical =
-      PhysicalColumns(model_->description(), prior_.FromStandard(standard));
-  Eigen::MatrixXd ends(2 * n_ * static_cast<Eigen::Index>(windows.size()), physical.cols());
-  windows_.Predict(physical, windows,
-                   [&](Eigen::Index sample, size_t window, size_t, const auto& q, const auto& v) {
-                     const Eigen::Index first = 2 * n_ * static_cast<Eigen::Index>(window);
-                     ends.col(sample).segment(first, n_) = space_.Coordinates(
-                         q, NearEnd(TransitionOf(pieces_[indices[window / each]])));
-                     ends.col(sample).segment(first + n_, n_) = v;
-                   });
-  simulated_steps_ += static_cast<int64_t>(windows.size()) * physical.cols();
-  return ends;
-}
-
 // All at the mode, side by side.
 void StreamingLaplace::Linearise(const std::vector<size_t>& indices) {
-  std::vector<Window> windows;
-  for (const size_t i : indices) {
-    const Piece& piece = pieces_[i];
-    windows.push_back(RecordedWindow(*model_, rollouts_[piece.rollout], piece.transition, 1));
-  }
-  Eigen::MatrixXd at = mode_.replicate(1, 1 + p_);
-  at.rightCols(p_).diagonal().array() += kSlopeDifference;
-  const Eigen::MatrixXd ends = Predict(at, windows, indices);
-  const auto sensitivities = StartSensitivities(indices, windows, ends.col(0));
+  std::vector<const ObservedTransition*> transitions;
+  for (const size_t i : indices) transitions.push_back(&pieces_[i].transition);
+  std::vector<Eigen::MatrixXd> errors = errors_.Linearise(rollouts_, transitions, mode_, noise_sd_);
   for (size_t k = 0; k < indices.size(); ++k) {
-    Piece& piece = pieces_[indices[k]];
-    const Eigen::Index first = 2 * n_ * static_cast<Eigen::Index>(k);
-    if (piece.coordinates.empty() || !ends.col(0).segment(first, 2 * n_).allFinite()) continue;
-    Eigen::MatrixXd raw(static_cast<Eigen::Index>(piece.coordinates.size()), 1 + p_);
-    const Transition& transition = TransitionOf(piece);
-    Eigen::VectorXd reading(2 * n_);
-    reading << space_.Coordinates(transition.next_q, NearEnd(transition)), transition.next_v;
-    for (Eigen::Index i = 0; i < raw.rows(); ++i) {
-      const int c = piece.coordinates[static_cast<size_t>(i)];
-      raw.row(i) = ends.row(first + c);
-      raw.row(i).tail(p_).array() -= raw(i, 0);
-      raw(i, 0) -= reading(c);
-    }
-    for (Eigen::Index j = 1; j <= p_; ++j) {
-      if (raw.col(j).allFinite()) continue;
-      // Where one step forward is no simulator, one backward has to do.
-      const Eigen::MatrixXd back = Predict(
-          mode_ - kSlopeDifference * Eigen::VectorXd::Unit(p_, j - 1), {windows[k]}, {indices[k]});
-      for (Eigen::Index i = 0; i < raw.rows(); ++i) {
-        const int c = piece.coordinates[static_cast<size_t>(i)];
-        raw(i, j) = ends(first + c, 0) - back(c, 0);
-      }
-      if (!raw.col(j).allFinite()) raw.col(j).setZero();  // nothing can be told of it
-    }
-    raw.rightCols(p_) /= kSlopeDifference;
-    Replace(piece, Whiten(piece, raw, sensitivities[k]));
+    if (errors[k].size() > 0) Replace(pieces_[indices[k]], std::move(errors[k]));
   }
-}
-
-// Sensitivities of the ends to the starts, 2 n x 2 n, of those windows whose start is uncertain;
-// by finite differences, or that of free motion where they fail.
-std::vector<Eigen::MatrixXd> StreamingLaplace::StartSensitivities(
-    const std::vector<size_t>& indices, const std::vector<Window>& windows,
-    const Eigen::VectorXd& middle) {
-  const Eigen::VectorXd differences = StartDifferences(noise_sd_);
-  std::vector<Window> moved;
-  std::vector<size_t> uncertain, moved_of;
-  for (size_t k = 0; k < indices.size(); ++k) {
-    if (!pieces_[indices[k]].start_uncertain) continue;
-    uncertain.push_back(k);
-    moved_of.push_back(indices[k]);
-    for (Eigen::Index c = 0; c < 2 * n_; ++c) {
-      moved.push_back(windows[k]);
-      MoveStart(space_, c, differences(c), &moved.back());
-    }
-  }
-  std::vector<Eigen::MatrixXd> sensitivities(indices.size());
-  if (moved.empty()) return sensitivities;
-  const Eigen::MatrixXd ends = Predict(mode_, moved, moved_of);
-  for (size_t u = 0; u < uncertain.size(); ++u) {
-    const size_t k = uncertain[u];
-    Eigen::MatrixXd sensitivity = Eigen::MatrixXd::Map(
-        ends.data() + 4 * n_ * n_ * static_cast<Eigen::Index>(u), 2 * n_, 2 * n_);
-    sensitivity.colwise() -= middle.segment(2 * n_ * static_cast<Eigen::Index>(k), 2 * n_);
-    sensitivity = sensitivity * differences.cwiseInverse().asDiagonal();
-    if (!sensitivity.allFinite())
-      sensitivity = FreeMotion(n_, TransitionOf(pieces_[indices[k]]).duration());
-    sensitivities[k] = std::move(sensitivity);
-  }
-  return sensitivities;
-}
-
-// @param raw errors and slopes of what was observed. @param sensitivity of all entries.
-Eigen::MatrixXd StreamingLaplace::Whiten(const Piece& piece, Eigen::MatrixXd raw,
-                                         const Eigen::MatrixXd& sensitivity) const {
-  const Transition& transition = TransitionOf(piece);
-  const Eigen::VectorXd recorded = StartSd(transition);
-  Eigen::VectorXd end_sd(raw.rows());
-  Eigen::MatrixXd observed(sensitivity.size() > 0 ? raw.rows() : 0, sensitivity.cols());
-  for (Eigen::Index i = 0; i < raw.rows(); ++i) {
-    const int c = piece.coordinates[static_cast<size_t>(i)];
-    const double sd = EndSd(transition, c);
-    end_sd(i) = sd > 0 ? sd : noise_sd_(c);
-    if (observed.rows() > 0) observed.row(i) = sensitivity.row(c);
-  }
-  const std::array<Eigen::Index, 2> step{0, raw.rows()};
-  WhitenWindow(step, recorded.array().isNaN().select(noise_sd_, recorded), observed, end_sd, raw);
-  return raw;
 }
 
 void StreamingLaplace::Replace(Piece& piece, Eigen::MatrixXd errors) {
   if (piece.at.size() > 0)
-    sums_.TakeAway(piece.coordinates, piece.errors, piece.at);
+    sums_.TakeAway(piece.transition.coordinates, piece.errors, piece.at);
   else
     --left_out_;
   piece.errors = std::move(errors);
   piece.at = mode_;
   piece.noise_version = noise_version_;
-  sums_.Add(piece.coordinates, piece.errors, piece.at);
+  sums_.Add(piece.transition.coordinates, piece.errors, piece.at);
 }
 
 bool StreamingLaplace::determined() const {
@@ -296,7 +172,7 @@ bool StreamingLaplace::Settle() {
     }
     sums_ = GroupSums(static_cast<int>(2 * n_), mode_);
     for (const Piece& piece : pieces_) {
-      if (piece.at.size() > 0) sums_.Add(piece.coordinates, piece.errors, piece.at);
+      if (piece.at.size() > 0) sums_.Add(piece.transition.coordinates, piece.errors, piece.at);
     }
     next_sums_ = GroupSums(static_cast<int>(2 * n_), mode_);
     next_ = 0;
@@ -327,10 +203,10 @@ Gaussian StreamingLaplace::standard() const {
 Gaussian StreamingLaplace::posterior() const {
   const Gaussian standard = this->standard();
   // dx/du: exact for normal priors.
-  const Eigen::VectorXd width = (prior_.FromStandard(mode_.array() + kSlopeDifference) -
-                                 prior_.FromStandard(mode_.array() - kSlopeDifference)) /
+  const Eigen::VectorXd width = (errors_.prior().FromStandard(mode_.array() + kSlopeDifference) -
+                                 errors_.prior().FromStandard(mode_.array() - kSlopeDifference)) /
                                 (2 * kSlopeDifference);
-  return {prior_.FromStandard(mode_),
+  return {errors_.prior().FromStandard(mode_),
           width.asDiagonal() * standard.covariance * width.asDiagonal()};
 }
 

@@ -6,12 +6,11 @@
 #include <memory>
 #include <vector>
 
+#include "calibrator/fit/transition_errors.h"
 #include "calibrator/inference/group_sums.h"
-#include "calibrator/inference/prior.h"
 #include "calibrator/motion/transitions.h"
 #include "common/gaussian.h"
-#include "robot/configuration_space.h"
-#include "sim/windows.h"
+#include "sim/model.h"
 
 namespace plumb {
 
@@ -62,38 +61,25 @@ class StreamingLaplace {
   const Eigen::VectorXd& noise_sd() const { return noise_sd_; }
   const Eigen::VectorXd& scale() const { return scale_; }
 
-  int64_t simulated_steps() const { return simulated_steps_; }
+  int64_t simulated_steps() const { return errors_.simulated_steps(); }
 
  private:
   struct Piece {
-    size_t rollout, transition;    // where in rollouts_
-    std::vector<int> coordinates;  // observed entries of (q, v)
-    bool start_uncertain;
-    int noise_version = -1;  // of the whitening
+    ObservedTransition transition;  // of rollouts_
+    int noise_version = -1;         // of the whitening
     // where it is linearised, standard coordinates; empty = it is left out
-    Eigen::VectorXd at;
-    Eigen::MatrixXd errors;  // observed x (1 + p): whitened errors and slopes
+    Eigen::VectorXd at = {};
+    Eigen::MatrixXd errors = {};  // see TransitionErrors::Linearise
   };
 
-  const Transition& TransitionOf(const Piece& piece) const;
   double DistanceFrom(const Eigen::VectorXd& at) const;
   std::vector<size_t> NextInTurn();
   void Linearise(const std::vector<size_t>& indices);
-  Eigen::MatrixXd Predict(const Eigen::MatrixXd& standard, const std::vector<Window>& windows,
-                          const std::vector<size_t>& indices);
-  std::vector<Eigen::MatrixXd> StartSensitivities(const std::vector<size_t>& indices,
-                                                  const std::vector<Window>& windows,
-                                                  const Eigen::VectorXd& middle);
-  Eigen::MatrixXd Whiten(const Piece& piece, Eigen::MatrixXd raw,
-                         const Eigen::MatrixXd& sensitivity) const;
   void Replace(Piece& piece, Eigen::MatrixXd errors);
   void Solve();
   bool AdaptNoise();
 
-  std::shared_ptr<const Model> model_;
-  Prior prior_;
-  Windows windows_;
-  ConfigurationSpace space_;
+  TransitionErrors errors_;
   Eigen::Index n_, p_;
   std::vector<Rollout> rollouts_;  // what came, one for each episode without another in between
   std::deque<Piece> pieces_;       // of each transition, in order
@@ -101,7 +87,7 @@ class StreamingLaplace {
   Eigen::MatrixXd precision_;      // there
   Eigen::VectorXd noise_sd_, scale_;
   int noise_version_ = 0;
-  int64_t unknown_rows_ = 0, uncertain_starts_ = 0, left_out_ = 0, simulated_steps_ = 0;
+  int64_t unknown_rows_ = 0, uncertain_starts_ = 0, left_out_ = 0;
   GroupSums sums_;       // of all pieces
   GroupSums next_sums_;  // of those before next_, summed up anew so that rounding does not pile up
   size_t next_ = 0;      // whose turn it is

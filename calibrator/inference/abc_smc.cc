@@ -87,7 +87,8 @@ VectorXd ImportanceWeights(const MatrixXd& u, const GaussianMixture& kernels) {
   return weights / weights.sum();
 }
 
-double Quantile(VectorXd values, double share) {
+// The smallest value that at least this share of them does not exceed.
+double NearestRankQuantile(VectorXd values, double share) {
   std::sort(values.begin(), values.end());
   const auto rank = static_cast<Index>(std::ceil(share * static_cast<double>(values.size())));
   return values(std::clamp<Index>(rank - 1, 0, values.size() - 1));
@@ -158,7 +159,7 @@ class Smc {
   // The next epsilon, and the kernels to draw from. A change of scale changes the unit of epsilon,
   // too: compared is the quantile with the largest distance now. @return false if it hardly falls.
   bool Narrow() {
-    const double next = Quantile(distances_, options_.quantile);
+    const double next = NearestRankQuantile(distances_, options_.quantile);
     if (!(next < (1 - options_.min_change) * distances_.maxCoeff())) return false;
     epsilon_ = next;
     kernels_ = Kernels(population_, options_.local_kernels);

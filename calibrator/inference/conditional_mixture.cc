@@ -11,6 +11,7 @@
 #include "calibrator/inference/truncated_prior.h"
 #include "common/decompositions.h"
 #include "common/median.h"
+#include "common/special_numbers.h"
 
 namespace plumb {
 namespace {
@@ -141,7 +142,7 @@ class Inference {
       const bool failed = !outcomes.col(j).allFinite();
       failures_ += failed;
       outcomes_.col(made_ + j) = outcomes.col(j)(compared_);
-      if (failed) outcomes_(0, made_ + j) = std::numeric_limits<double>::quiet_NaN();
+      if (failed) outcomes_(0, made_ + j) = kNaN;
     }
     made_ = until;
   }

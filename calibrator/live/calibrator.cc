@@ -6,7 +6,6 @@
 
 #include "common/special_numbers.h"
 #include "plumb/policy_t.hpp"
-#include "robot/parameter_distribution.h"
 
 namespace plumb {
 namespace {
@@ -16,11 +15,6 @@ std::span<const Rollout> Completed(const SimOpt::State& state) {
   const bool running = static_cast<int>(state.rollouts_per_iteration.size()) > state.iteration;
   const int newest = running ? state.rollouts_per_iteration.back() : 0;
   return std::span(state.rollouts).first(state.rollouts.size() - static_cast<size_t>(newest));
-}
-
-ParameterDistribution Distribution(const RobotDescription& robot, const SimOpt::State& state) {
-  return {state.iteration, robot.parameters, state.distribution,
-          state.residual,  state.explained,  Starts(Completed(state))};
 }
 
 // An iteration's identity is its newest episode's start: a time that live run and replay share.
@@ -76,10 +70,15 @@ size_t Calibrator::Begin() {
   return usable;
 }
 
+ParameterDistribution DistributionOf(const RobotDescription& robot, const SimOpt::State& state) {
+  return {state.iteration, robot.parameters, state.distribution,
+          state.residual,  state.explained,  Starts(Completed(state))};
+}
+
 parameter_distribution_t DistributionMessage(const RobotDescription& robot,
                                              const SimOpt::State& state, uint64_t seed,
                                              const CalibrationReport* report) {
-  parameter_distribution_t m = Distribution(robot, state).ToMessage();
+  parameter_distribution_t m = DistributionOf(robot, state).ToMessage();
   m.utime = Time(state);
   m.seed = static_cast<int64_t>(seed);
   if (report) {
@@ -148,7 +147,7 @@ calibration_status_t StatusMessage(const RobotDescription& robot, const SimOpt::
   m.num_horizons = static_cast<int32_t>(m.horizon.size());
   m.num_powers = static_cast<int32_t>(m.combination_power.size());
   m.num_combinations = static_cast<int32_t>(m.combination.size());
-  const ParameterDistribution distribution = Distribution(robot, state);
+  const ParameterDistribution distribution = DistributionOf(robot, state);
   const Eigen::VectorXd mean = distribution.Mean(), sd = distribution.Sd();
   m.mean.assign(mean.begin(), mean.end());
   m.sd.assign(sd.begin(), sd.end());

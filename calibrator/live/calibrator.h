@@ -11,6 +11,7 @@
 #include "plumb/controller_status_t.hpp"
 #include "plumb/parameter_distribution_t.hpp"
 #include "robot/description.h"
+#include "robot/parameter_distribution.h"
 
 namespace plumb {
 
@@ -47,7 +48,10 @@ class Calibrator {
   int next_step_ = 0;  // of it, to be taken
 };
 
-/// SimOpt's distribution as a message. @param report of the iteration that led there; null for the
+/// SimOpt's distribution over the robot's simulators, as the iterations completed so far have it:
+/// with starts of their roll-outs alone. Thread-safe.
+ParameterDistribution DistributionOf(const RobotDescription& robot, const SimOpt::State& state);
+/// The same as a message. @param report of the iteration that led there; null for the
 /// prior.
 parameter_distribution_t DistributionMessage(const RobotDescription& robot,
                                              const SimOpt::State& state, uint64_t seed,

@@ -17,6 +17,7 @@
 #include "calibrator/live/rollout_json.h"
 #include "common/atomic_file.h"
 #include "common/checked_file.h"
+#include "common/message_bytes.h"
 #include "robot/json_text.h"
 #include "robot/parameter_distribution.h"
 
@@ -169,10 +170,7 @@ json ToJson(const std::shared_ptr<const Residual>& residual, const RobotDescript
   if (!residual) return nullptr;
   ParameterDistribution distribution = ParameterDistribution::Prior(robot);
   distribution.residual = residual;
-  const parameter_distribution_t message = distribution.ToMessage();
-  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return fmt::format("{:02x}", fmt::join(bytes, ""));
+  return fmt::format("{:02x}", fmt::join(Encode(distribution.ToMessage()), ""));
 }
 
 std::shared_ptr<const Residual> ResidualFrom(const json& j, const RobotDescription& robot) {
@@ -185,9 +183,7 @@ std::shared_ptr<const Residual> ResidualFrom(const json& j, const RobotDescripti
     good = good && std::from_chars(begin, begin + 2, bytes[i], 16).ptr == begin + 2;
   }
   parameter_distribution_t message;
-  const auto size = static_cast<int>(bytes.size());
-  if (!good || message.decode(bytes.data(), 0, size) != size)
-    throw std::runtime_error("the residual is none");
+  if (!good || !Decode(bytes, message)) throw std::runtime_error("the residual is none");
   return ParameterDistribution::FromMessage(message, robot).residual;
 }
 

@@ -4,11 +4,12 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
 #include <vector>
+
+#include "common/special_numbers.h"
 
 namespace plumb {
 
@@ -37,8 +38,6 @@ Int Whole(const nlohmann::json& j) {
 }
 
 /// JSON has no NaN: null.
-inline double NumberOrNaN(const nlohmann::json& j) {
-  return j.is_null() ? std::numeric_limits<double>::quiet_NaN() : j.get<double>();
-}
+inline double NumberOrNaN(const nlohmann::json& j) { return j.is_null() ? kNaN : j.get<double>(); }
 
 }  // namespace plumb

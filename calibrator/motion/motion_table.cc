@@ -112,29 +112,66 @@ std::string Normalise(const ConfigurationSpace& space, const std::vector<MotionR
   return fault.empty() ? fault : "next_q " + fault;
 }
 
+/// Says what is wrong with a row of a file: its reader names file and line.
+class FaultsInFile {
+ public:
+  explicit FaultsInFile(const CsvReader& table) : table_(table) {}
+  void NoTime() const { table_.Fail("t must be known"); }
+  void SameTime(double t) const { table_.Fail(fmt::format("t is {}, as in the row before", t)); }
+  void NoState(const std::string& fault) const { table_.Fail(fault); }
+
+ private:
+  const CsvReader& table_;
+};
+
+/// The same of a row in memory, by its number.
+class FaultsInMemory {
+ public:
+  explicit FaultsInMemory(Eigen::Index row) : row_(row) {}
+  void NoTime() const { Fail(fmt::format("t: is not known in row {}", row_)); }
+  void SameTime(double t) const {
+    Fail(fmt::format("t: is {} in row {}, as in the row before", t, row_));
+  }
+  void NoState(const std::string& fault) const { Fail(fmt::format("{}, in row {}", fault, row_)); }
+
+ private:
+  [[noreturn]] static void Fail(const std::string& what) { throw std::invalid_argument(what); }
+
+  Eigen::Index row_;
+};
+
+/// Judges a row, and appends it. @param read fills in the states, once the time is known to be
+/// good: of several faults in a row the first is told. @param faults throws.
+template <class Read, class Faults>
+void AppendRow(const ConfigurationSpace& space, MotionRow row, const Read& read,
+               const Faults& faults, std::vector<MotionRow>* rows) {
+  if (std::isnan(row.t)) faults.NoTime();
+  if (!rows->empty() && !rows->back().ends && rows->back().t == row.t) faults.SameTime(row.t);
+  read(&row.transition);
+  if (const std::string fault = Normalise(space, *rows, &row); !fault.empty())
+    faults.NoState(fault);
+  rows->push_back(std::move(row));
+}
+
 std::vector<MotionRow> ReadRows(CsvReader& table, const TableColumns& columns,
                                 const RobotDescription& robot, Efforts& efforts) {
   const ConfigurationSpace space(robot);
   const DriveTargets targets(table, robot, columns.target, columns.kp, columns.kd);
   const Eigen::VectorXd no_velocity = Eigen::VectorXd::Constant(space.num_velocities(), kNaN);
+  const auto read = [&](Transition* transition) {
+    transition->q = Numbers(table, columns.q);
+    transition->v = columns.has_velocities() ? Numbers(table, columns.v) : no_velocity;
+    if (!columns.has_next()) return;
+    transition->next_q = Numbers(table, columns.next_q);
+    transition->next_v = Numbers(table, columns.next_v);
+  };
   std::vector<MotionRow> rows;
   while (table.Next()) {
     MotionRow row{Number(table, columns.t, kLatest),
                   Flag(table, columns.terminated) || Flag(table, columns.truncated),
                   efforts(Actions(table, columns.u)) + targets.Effort(),
                   {}};
-    if (std::isnan(row.t)) table.Fail("t must be known");
-    if (!rows.empty() && !rows.back().ends && rows.back().t == row.t) {
-      table.Fail(fmt::format("t is {}, as in the row before", row.t));
-    }
-    row.transition.q = Numbers(table, columns.q);
-    row.transition.v = columns.has_velocities() ? Numbers(table, columns.v) : no_velocity;
-    if (columns.has_next()) {
-      row.transition.next_q = Numbers(table, columns.next_q);
-      row.transition.next_v = Numbers(table, columns.next_v);
-    }
-    if (const std::string fault = Normalise(space, rows, &row); !fault.empty()) table.Fail(fault);
-    rows.push_back(std::move(row));
+    AppendRow(space, std::move(row), read, FaultsInFile(table), &rows);
   }
   if (!columns.has_velocities()) DifferencePositions(space, robot.task.period, &rows);
   return rows;
@@ -220,17 +257,12 @@ MotionTable MakeMotionTable(const MotionColumns& columns, const RobotDescription
                   !columns.ends.empty() && columns.ends[static_cast<size_t>(i)],
                   efforts(columns.u.row(i)),
                   {}};
-    if (std::isnan(row.t)) throw std::invalid_argument(fmt::format("t: is not known in row {}", i));
-    if (!motion.rows.empty() && !motion.rows.back().ends && motion.rows.back().t == row.t) {
-      throw std::invalid_argument(
-          fmt::format("t: is {} in row {}, as in the row before", row.t, i));
-    }
-    row.transition.q = columns.q.row(i), row.transition.v = columns.v.row(i);
-    if (has_next)
-      row.transition.next_q = columns.next_q.row(i), row.transition.next_v = columns.next_v.row(i);
-    if (const std::string fault = Normalise(space, motion.rows, &row); !fault.empty())
-      throw std::invalid_argument(fmt::format("{}, in row {}", fault, i));
-    motion.rows.push_back(std::move(row));
+    const auto read = [&](Transition* transition) {
+      transition->q = columns.q.row(i), transition->v = columns.v.row(i);
+      if (has_next)
+        transition->next_q = columns.next_q.row(i), transition->next_v = columns.next_v.row(i);
+    };
+    AppendRow(space, std::move(row), read, FaultsInMemory(i), &motion.rows);
   }
   motion.warnings = Warnings(motion, efforts, robot);
   return motion;

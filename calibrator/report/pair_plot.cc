@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "calibrator/report/report_plots.h"
+#include "common/quantile.h"
 #include "plot/svg.h"
 
 namespace plumb {

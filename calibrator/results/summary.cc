@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "common/decompositions.h"
+#include "common/quantile.h"
 #include "robot/parameter_distribution.h"
 
 namespace plumb {
@@ -86,14 +86,6 @@ std::string Contradiction(const Findings& findings, const RobotDescription& robo
       "log and prior contradict each other: {}; are signs and units of the log right, efforts "
       "above all, or was the prior too sure?",
       fmt::join(far, ", "));
-}
-
-double Quantile(const std::vector<double>& sorted, double share) {
-  if (sorted.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const double at = share * static_cast<double>(sorted.size() - 1);
-  const auto below = static_cast<size_t>(at);
-  const size_t above = std::min(below + 1, sorted.size() - 1);
-  return sorted[below] + (at - static_cast<double>(below)) * (sorted[above] - sorted[below]);
 }
 
 Summary Summarise(const Findings& findings, const RobotDescription& robot) {

@@ -45,9 +45,4 @@ std::string Contradiction(const Findings& findings, const RobotDescription& robo
 /// One prior of 16 000 that is right is so far from the truth.
 inline constexpr double kContradiction = 4;
 
-/// Quantile of sorted values, linear between them (type 7 of Hyndman and Fan, The American
-/// Statistician 50, 1996).
-/// @param share 0 to 1. @return NaN of no values.
-double Quantile(const std::vector<double>& sorted, double share);
-
 }  // namespace plumb

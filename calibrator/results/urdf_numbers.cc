@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <Eigen/Geometry>
+#include <Eigen/Core>
 #include <cmath>
 #include <cstdlib>
+
+#include "robot/roll_pitch_yaw.h"
 
 namespace plumb {
 
@@ -34,11 +36,7 @@ Vector3d Vector(const TiXmlElement* element, const char* attribute) {
 }
 
 Matrix3d Rotation(const TiXmlElement* origin) {
-  const Vector3d rpy = Vector(origin, "rpy");
-  return (Eigen::AngleAxisd(rpy.z(), Vector3d::UnitZ()) *
-          Eigen::AngleAxisd(rpy.y(), Vector3d::UnitY()) *
-          Eigen::AngleAxisd(rpy.x(), Vector3d::UnitX()))
-      .toRotationMatrix();
+  return FromRollPitchYaw(Vector(origin, "rpy")).toRotationMatrix();
 }
 
 const TiXmlElement* Named(const TiXmlElement& root, const char* kind, const std::string& name) {

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "common/lockstep/process_watch.h"
+#include "common/message_bytes.h"
 #include "common/time_units.h"
 #include "plumb/lockstep_grant_t.hpp"
 

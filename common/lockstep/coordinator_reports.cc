@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/lockstep/coordinator.h"
+#include "common/message_bytes.h"
 #include "common/program_version.h"
 #include "common/time_units.h"
 #include "plumb/lockstep_grant_t.hpp"

@@ -52,19 +52,4 @@ class PacketSocket {
   size_t begin_ = 0, end_ = 0;  // of what has been read into in_ and not been taken
 };
 
-/// Encodes an LCM type for a packet. @param buffer is overwritten.
-template <class Message>
-std::span<const uint8_t> Encode(const Message& message, std::vector<uint8_t>& buffer) {
-  buffer.resize(static_cast<size_t>(message.getEncodedSize()));
-  message.encode(buffer.data(), 0, static_cast<int>(buffer.size()));
-  return buffer;
-}
-
-/// @return false if it is another type, or another version's.
-template <class Message>
-bool Decode(std::span<const uint8_t> packet, Message& message) {
-  const int length = static_cast<int>(packet.size());
-  return message.decode(packet.data(), 0, length) == length;
-}
-
 }  // namespace plumb

@@ -12,6 +12,7 @@
 #include "common/lockstep/coordinator.h"
 #include "common/lockstep/packet_socket.h"
 #include "common/lockstep/participant.h"
+#include "common/message_bytes.h"
 #include "common/program_version.h"
 #include "plumb/lockstep_grant_t.hpp"
 #include "plumb/lockstep_hello_t.hpp"

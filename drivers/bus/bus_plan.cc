@@ -8,7 +8,10 @@
 #include <map>
 #include <set>
 
+#include "common/special_numbers.h"
 #include "drivers/bus/bus_collisions.h"
+#include "drivers/bus/frame_bits.h"
+#include "drivers/bus/response_time.h"
 #include "drivers/protocols/registry.h"
 
 namespace plumb {
@@ -18,21 +21,6 @@ using Direction = BusMessage::Direction;
 using Row = BusPlan::Row;
 
 constexpr int64_t kNanoseconds = 1000;  // in a microsecond
-constexpr int kMaxRounds = 100'000;     // of an iteration that is known to end
-
-// From start of frame to the end of the CRC: what is stuffed, without the data.
-constexpr int kStuffed = 34, kStuffedExtended = 54;
-// CRC delimiter, acknowledgement, end of frame, interframe space.
-constexpr int kUnstuffed = 13;
-
-// Of CAN FD, as ISO 11898-1:2015 has it. From start of frame to the bit that says that the rate is
-// switched: start 1, id 11, RRS, IDE, FDF, res, BRS; of an extended one SRR and 18 more bits of id.
-constexpr int kSlowFd = 17, kSlowFdExtended = 36;
-// ESI and the length's code, which are stuffed like the data behind them.
-constexpr int kFastFd = 5;
-// Stuff count 4 and CRC of 17 or, beyond 16 bytes, 21 bits, with a stuff bit before the first and
-// behind each fourth of them, whatever they say.
-constexpr int kShortCrcFd = 4 + 17 + 6, kLongCrcFd = 4 + 21 + 7;
 
 // The order in which ids win: the 11 bits that both formats have, then standard before extended.
 uint64_t Priority(const BusMessage& message) {
@@ -40,57 +28,15 @@ uint64_t Priority(const BusMessage& message) {
   return message.extended ? (id >> 18) << 19 | uint64_t{1} << 18 | (id & 0x3FFFF) : id << 19;
 }
 
-/// Times of one message [ns].
-struct Task {
-  int64_t cost, period, jitter;
-};
-
 /// [ns] of a bit, rounded up.
 int64_t BitTime(double rate) { return static_cast<int64_t>(std::ceil(1e9 / rate)); }
 
 int64_t Cost(const Row& row) { return std::llround(row.worst_time * kNanoseconds); }
 
-int64_t Releases(const Task& task, int64_t window) {
-  return (window + task.jitter + task.period - 1) / task.period;
-}
-
-/// The last of the tasks, the others before it in priority, all with periods; `blocking` [ns] of
-/// what may have begun. @return [ns] or -1: it may wait for ever.
-int64_t Response(const std::vector<Task>& tasks, int64_t blocking, int64_t bit) {
-  const Task& own = tasks.back();
-  double load = 0;
-  for (const Task& task : tasks)
-    load += static_cast<double>(task.cost) / static_cast<double>(task.period);
-  if (load >= 1) return -1;
-  // The longest time in which the bus is busy with this one and higher ones.
-  int64_t busy = own.cost;
-  for (int round = 0;; ++round) {
-    if (round > kMaxRounds) return -1;
-    int64_t next = blocking;
-    for (const Task& task : tasks) next += Releases(task, busy) * task.cost;
-    if (next == busy) break;
-    busy = next;
-  }
-  int64_t worst = 0;
-  for (int64_t instance = 0; instance < Releases(own, busy); ++instance) {
-    int64_t wait = blocking + instance * own.cost;
-    for (int round = 0;; ++round) {
-      if (round > kMaxRounds) return -1;
-      int64_t next = blocking + instance * own.cost;
-      for (size_t i = 0; i + 1 < tasks.size(); ++i)
-        next += Releases(tasks[i], wait + bit) * tasks[i].cost;
-      if (next == wait) break;
-      wait = next;
-    }
-    worst = std::max(worst, own.jitter + wait - instance * own.period + own.cost);
-  }
-  return worst;
-}
-
 /// Of the polled messages of a direction one waits at a time: together they are one, the longest,
 /// as often as all of them.
-Task PolledTask(const BusPlan& plan, Direction direction) {
-  Task all{0, 0, 0};
+FrameTimes PolledTimes(const BusPlan& plan, Direction direction) {
+  FrameTimes all{0, 0, 0};
   double rate = 0;
   for (const Row& row : plan.rows) {
     const BusMessage& message = row.message;
@@ -105,7 +51,7 @@ Task PolledTask(const BusPlan& plan, Direction direction) {
 
 void ComputeResponses(BusPlan& plan) {
   const int64_t bit = BitTime(plan.bit_rate);
-  std::vector<Task> higher;
+  std::vector<FrameTimes> higher;
   std::map<Direction, size_t> polled;  // where in `higher`
   for (size_t i = 0; i < plan.rows.size(); ++i) {
     Row& row = plan.rows[i];
@@ -116,19 +62,19 @@ void ComputeResponses(BusPlan& plan) {
     row.deadline = static_cast<double>(row.message.period);
     int64_t response;
     if (row.message.polled) {
-      const Task all = PolledTask(plan, row.message.direction);
+      const FrameTimes all = PolledTimes(plan, row.message.direction);
       // It must be there before the next one is asked for.
       row.deadline = static_cast<double>(all.period) / static_cast<double>(kNanoseconds);
       const auto [counted, first] = polled.try_emplace(row.message.direction, higher.size());
       if (first) higher.push_back(all);
-      std::vector<Task> tasks = higher;
-      std::rotate(tasks.begin() + static_cast<std::ptrdiff_t>(counted->second),
-                  tasks.begin() + static_cast<std::ptrdiff_t>(counted->second) + 1, tasks.end());
-      response = Response(tasks, blocking, bit);
+      std::vector<FrameTimes> frames = higher;
+      std::rotate(frames.begin() + static_cast<std::ptrdiff_t>(counted->second),
+                  frames.begin() + static_cast<std::ptrdiff_t>(counted->second) + 1, frames.end());
+      response = ResponseTime(frames, blocking, bit);
     } else {
       higher.push_back(
           {Cost(row), row.message.period * kNanoseconds, row.message.jitter * kNanoseconds});
-      response = Response(higher, blocking, bit);
+      response = ResponseTime(higher, blocking, bit);
     }
     row.response = response < 0 ? std::numeric_limits<double>::infinity()
                                 : static_cast<double>(response) / static_cast<double>(kNanoseconds);
@@ -180,7 +126,7 @@ Row MakeRow(const std::string& device, const BusMessage& message, const BusPlan&
           time(nominal),
           time(worst),
           0,
-          std::numeric_limits<double>::quiet_NaN(),
+          kNaN,
           0};
 }
 
@@ -228,30 +174,6 @@ void Judge(BusPlan& plan) {
 }
 
 }  // namespace
-
-int NominalBits(bool extended, int length) {
-  return (extended ? kStuffedExtended : kStuffed) + kUnstuffed + 8 * length;
-}
-
-int WorstCaseBits(bool extended, int length) {
-  const int stuffed = (extended ? kStuffedExtended : kStuffed) + 8 * length;
-  return stuffed + kUnstuffed + (stuffed - 1) / 4;
-}
-
-FdBits NominalFdBits(bool extended, int length) {
-  return {(extended ? kSlowFdExtended : kSlowFd) + kUnstuffed,
-          kFastFd + 8 * length + (length > 16 ? kLongCrcFd : kShortCrcFd)};
-}
-
-FdBits WorstCaseFdBits(bool extended, int length) {
-  const int slow = extended ? kSlowFdExtended : kSlowFd, fast = kFastFd + 8 * length;
-  // What is stuffed goes on across the switch of rates.
-  const int all = (slow + fast - 1) / 4, before = (slow - 1) / 4;
-  FdBits bits = NominalFdBits(extended, length);
-  bits.slow += before;
-  bits.fast += all - before;
-  return bits;
-}
 
 BusPlan PlanBus(const std::vector<BusDevice>& devices, double bit_rate, double data_bit_rate) {
   BusPlan plan;

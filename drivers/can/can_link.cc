@@ -1,6 +1,8 @@
 #include "drivers/can/can_link.h"
 
+#include <linux/can.h>
 #include <linux/can/netlink.h>
+#include <linux/can/raw.h>
 #include <linux/if_link.h>
 #include <linux/rtnetlink.h>
 #include <sys/socket.h>
@@ -38,6 +40,10 @@ Bytes Attribute(Bytes bytes, int type) {
 }
 
 }  // namespace
+
+bool KernelHasCan() noexcept {
+  return FileDescriptor(socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW)).valid();
+}
 
 std::optional<CanLink> ParseCanLink(Bytes message) {
   const auto header = Read<nlmsghdr>(message);

@@ -7,6 +7,10 @@
 
 namespace plumb {
 
+/// Whether this kernel gives a process raw CAN sockets: without them there is no SocketCAN.
+/// Thread-safe.
+bool KernelHasCan() noexcept;
+
 /// How a CAN interface is set up, as far as its kind tells (vcan has no bit rate, nor restarts).
 struct CanLink {
   std::string kind;  ///< "can", "vcan", "vxcan"

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 
+#include "common/special_numbers.h"
 #include "drivers/driver/driver.h"
 #include "drivers/driver/phase_times.h"
 
@@ -17,7 +17,7 @@ void Driver::PrepareMessages() {
        {&state_message_.position, &state_message_.velocity, &state_message_.effort_measured,
         &state_message_.effort_sent, &state_message_.effort_applied}) {
     // of joints that nothing measures
-    values->assign(size, std::numeric_limits<double>::quiet_NaN());
+    values->assign(size, kNaN);
   }
   state_message_.valid.resize(size);
   state_message_.measured.resize(size);
@@ -41,7 +41,7 @@ void Driver::PrepareMessages() {
   }
   for (auto* values :
        {&status_.motor_temperature, &status_.drive_temperature, &status_.bus_voltage}) {
-    values->assign(size, std::numeric_limits<double>::quiet_NaN());
+    values->assign(size, kNaN);
   }
   status_.num_sensors = static_cast<int32_t>(sensors_.size());
   for (const JointSensor& sensor : sensors_) status_.sensor_name.push_back(sensor.name());
@@ -75,10 +75,10 @@ const joint_state_t* Driver::NextState() noexcept {
     message.measured[i] = sensor.measured();
     message.position[i] = measurement.position;
     message.velocity[i] = measurement.velocity;
-    message.effort_measured[i] = std::numeric_limits<double>::quiet_NaN();
+    message.effort_measured[i] = kNaN;
     message.valid[i] = sensor.fresh(now_) && std::isfinite(measurement.position);
   }
-  std::ranges::fill(message.effort_applied, std::numeric_limits<double>::quiet_NaN());
+  std::ranges::fill(message.effort_applied, kNaN);
   history_.At(utime, message.effort_sent);
   if (has_previous_) history_.Average(previous_utime_, utime, message.effort_applied);
   previous_utime_ = utime;

@@ -1,7 +1,8 @@
 #include "drivers/driver/effort_history.h"
 
 #include <algorithm>
-#include <limits>
+
+#include "common/special_numbers.h"
 
 namespace plumb {
 
@@ -22,7 +23,7 @@ void EffortHistory::Record(int64_t utime, std::span<const double> effort) noexce
 
 void EffortHistory::Average(int64_t from, int64_t to, std::span<double> average) const noexcept {
   const bool covered = count_ > 0 && from < to && utime_[Slot(count_ - 1)] <= from;
-  std::fill_n(average.begin(), joints_, covered ? 0 : std::numeric_limits<double>::quiet_NaN());
+  std::fill_n(average.begin(), joints_, covered ? 0 : kNaN);
   if (!covered) return;
   int64_t end = to;
   for (size_t age = 0; age < count_ && end > from; ++age) {
@@ -37,7 +38,7 @@ void EffortHistory::Average(int64_t from, int64_t to, std::span<double> average)
 }
 
 void EffortHistory::At(int64_t utime, std::span<double> effort) const noexcept {
-  std::fill_n(effort.begin(), joints_, std::numeric_limits<double>::quiet_NaN());
+  std::fill_n(effort.begin(), joints_, kNaN);
   for (size_t age = 0; age < count_; ++age) {
     const size_t slot = Slot(age);
     if (utime_[slot] > utime) continue;

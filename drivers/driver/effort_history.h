@@ -18,7 +18,6 @@ class EffortHistory {
   /// From `utime` [us] on the joints' setpoints are these. Time that does not advance (the clock
   /// was set back) forgets everything before.
   void Record(int64_t utime, std::span<const double> effort) noexcept;
-  void Clear() noexcept { count_ = 0; }
 
   /// Time averages over [from, to]; NaN unless from < to and the history reaches back to `from`.
   void Average(int64_t from, int64_t to, std::span<double> average) const noexcept;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/special_numbers.h"
 #include "common/time_units.h"
 #include "drivers/protocols/registry.h"
 
@@ -28,9 +29,9 @@ JointSensor::JointSensor(const RobotDescription& robot, const SensorDescription&
       imu_samples_(Microseconds(sensor.period)),
       samples_(Microseconds(sensor.period)) {
   device_ = MakeSensor(sensor, {.timeout = stale_after_});
-  newest_.position = given_.position = std::numeric_limits<double>::quiet_NaN();
-  newest_.velocity = given_.velocity = std::numeric_limits<double>::quiet_NaN();
-  newest_.effort = given_.effort = std::numeric_limits<double>::quiet_NaN();
+  newest_.position = given_.position = kNaN;
+  newest_.velocity = given_.velocity = kNaN;
+  newest_.effort = given_.effort = kNaN;
   if (sensor.link < 0) return;
   message_.name = sensor.name;
   message_.link = robot.links[static_cast<size_t>(sensor.link)].name;
@@ -60,8 +61,7 @@ void JointSensor::Take(const JointMeasurement& measurement, int64_t now, int64_t
 }
 
 JointMeasurement JointSensor::OfEncoder(const EncoderReading& reading) const noexcept {
-  return {scale_ * reading.position + offset_, scale_ * reading.velocity,
-          std::numeric_limits<double>::quiet_NaN()};
+  return {scale_ * reading.position + offset_, scale_ * reading.velocity, kNaN};
 }
 
 Eigen::Quaterniond JointSensor::LinkOrientation(const ImuSample& sample) const noexcept {
@@ -70,14 +70,13 @@ Eigen::Quaterniond JointSensor::LinkOrientation(const ImuSample& sample) const n
 }
 
 JointMeasurement JointSensor::OfImu(const ImuSample& sample) noexcept {
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   const double twist = mounting_.Angle(LinkOrientation(sample));
   // The one of the angles that look like this which is next to the last.
   const double near = std::isfinite(newest_.position) && turns_counted_ ? newest_.position : 0;
   turns_counted_ = true;
   const double rate = mounting_.axis.dot(to_link_ * Vector(sample.rate));
   return {near + std::remainder(twist - near, 2 * std::numbers::pi),
-          sample.rate_clipped ? kNone : rate, kNone};
+          sample.rate_clipped ? kNaN : rate, kNaN};
 }
 
 const JointMeasurement& JointSensor::At(int64_t utime) noexcept {

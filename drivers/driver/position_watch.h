@@ -1,7 +1,6 @@
 #pragma once
 
-#include <limits>
-
+#include "common/special_numbers.h"
 #include "drivers/protocols/reason.h"
 #include "robot/description.h"
 
@@ -31,7 +30,7 @@ class PositionWatch {
  private:
   double lower_, upper_;  // infinite: none
   const char* unit_;
-  double position_ = std::numeric_limits<double>::quiet_NaN();
+  double position_ = kNaN;
   bool beyond_ = false;
 };
 

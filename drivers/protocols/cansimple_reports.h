@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "common/special_numbers.h"
 #include "drivers/protocols/cansimple.h"
 #include "drivers/protocols/motor.h"
 
@@ -55,7 +56,7 @@ class CanSimpleReports {
   void LookForRestart() noexcept;
 
   MotorEstimate estimate_;
-  double torque_estimate_ = std::numeric_limits<double>::quiet_NaN();
+  double torque_estimate_ = kNaN;
   MotorReadings readings_;
   Reason identity_;
   std::optional<Firmware> firmware_;

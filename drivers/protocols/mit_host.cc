@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "common/special_numbers.h"
 #include "common/time_units.h"
 #include "drivers/protocols/answering_motor.h"
 #include "drivers/protocols/mit.h"
@@ -155,7 +156,7 @@ class MitMotor : public AnsweringMotor<Step> {
   const std::array<Layout, 3> replies_by_length_;
 
   MotorEstimate estimate_;
-  double torque_estimate_ = std::numeric_limits<double>::quiet_NaN();
+  double torque_estimate_ = kNaN;
   MotorReadings readings_;
   double raw_ = 0;  // [rad] position of the last reply
   int error_ = kNoError;

@@ -3,11 +3,11 @@
 #include <array>
 #include <cstdint>
 #include <initializer_list>
-#include <limits>
 #include <numbers>
 #include <span>
 #include <string_view>
 
+#include "common/special_numbers.h"
 #include "drivers/protocols/fields.h"
 
 /// mjbots' moteus controllers: registers that are written and read by frames of CAN FD. A frame is
@@ -219,12 +219,12 @@ constexpr bool HasShape(const Shape& shape, const Frame& frame) {
 
 /// The contents of a command in position mode.
 struct Setpoint {
-  double position = std::numeric_limits<double>::quiet_NaN();  ///< [turns]; nan: where it is
-  double velocity = 0;                                         ///< [turns/s]
-  double torque = 0;                                           ///< [Nm]
-  double kp = 0, kd = 0;  ///< 0 to 1, of the gains that the motor has stored
-  double max_torque = 0;  ///< [Nm]
-  int64_t timeout = 0;    ///< [ms] up to 32767
+  double position = kNaN;  ///< [turns]; nan: where it is
+  double velocity = 0;     ///< [turns/s]
+  double torque = 0;       ///< [Nm]
+  double kp = 0, kd = 0;   ///< 0 to 1, of the gains that the motor has stored
+  double max_torque = 0;   ///< [Nm]
+  int64_t timeout = 0;     ///< [ms] up to 32767
 };
 constexpr Frame MakeCommand(int node, const Setpoint& s) {
   return MakeFrame(CommandId(node), kCommand,

@@ -5,6 +5,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "common/special_numbers.h"
+
 namespace plumb {
 namespace {
 
@@ -13,7 +15,7 @@ using namespace moteus;
 constexpr double kNotANumber = -128;  // of an int8 register
 
 double Reading(double value, double scale = 1) {
-  return value == kNotANumber * scale ? std::numeric_limits<double>::quiet_NaN() : value;
+  return value == kNotANumber * scale ? kNaN : value;
 }
 
 }  // namespace
@@ -38,10 +40,9 @@ FrameUse MoteusReports::OnAnswer(const FieldValues& values, int64_t now) noexcep
   ++answers_;
   mode_ = static_cast<int>(mode);
   fault_ = static_cast<int>(fault);
-  torque_estimate_ = std::isfinite(torque) ? torque : std::numeric_limits<double>::quiet_NaN();
+  torque_estimate_ = std::isfinite(torque) ? torque : kNaN;
   // One without a thermistor says 0.
-  readings_.motor_temperature = motor_temperature == 0 ? std::numeric_limits<double>::quiet_NaN()
-                                                       : Reading(motor_temperature);
+  readings_.motor_temperature = motor_temperature == 0 ? kNaN : Reading(motor_temperature);
   readings_.drive_temperature = Reading(temperature);
   readings_.bus_voltage = Reading(voltage, kAnswer.layout.fields[7].scale);
   if (!std::isnan(readings_.drive_temperature)) readings_.temperatures_at = now;

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string_view>
 
+#include "common/special_numbers.h"
 #include "drivers/protocols/moteus.h"
 #include "drivers/protocols/motor.h"
 #include "drivers/protocols/uptime_watch.h"
@@ -44,7 +45,7 @@ class MoteusReports {
   FrameUse OnText(const Frame& frame) noexcept;
 
   MotorEstimate estimate_;
-  double torque_estimate_ = std::numeric_limits<double>::quiet_NaN();
+  double torque_estimate_ = kNaN;
   MotorReadings readings_;
   int64_t answers_ = 0;
   int mode_ = moteus::kStopped, fault_ = 0;

@@ -2,11 +2,11 @@
 
 #include <array>
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <string>
 #include <string_view>
 
+#include "common/special_numbers.h"
 #include "drivers/can/frame.h"
 #include "drivers/can/transport.h"
 #include "drivers/protocols/bus_device.h"
@@ -27,11 +27,11 @@ struct MotorEstimate {
 /// A drive's other reports, for whoever watches over it. NaN = it does not report that, or has
 /// not yet.
 struct MotorReadings {
-  double motor_temperature = std::numeric_limits<double>::quiet_NaN();  ///< [degC]
+  double motor_temperature = kNaN;  ///< [degC]
   /// [degC] of its power stage
-  double drive_temperature = std::numeric_limits<double>::quiet_NaN();
-  double bus_voltage = std::numeric_limits<double>::quiet_NaN();  ///< [V] of its supply
-  double bus_current = std::numeric_limits<double>::quiet_NaN();  ///< [A] from its supply
+  double drive_temperature = kNaN;
+  double bus_voltage = kNaN;    ///< [V] of its supply
+  double bus_current = kNaN;    ///< [A] from its supply
   int64_t temperatures_at = 0;  ///< [us] when it reported temperatures last; 0 before it has
 };
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "common/special_numbers.h"
 #include "drivers/protocols/motor.h"
 #include "drivers/protocols/uptime_watch.h"
 
@@ -39,7 +40,7 @@ class RmdReports {
   MotorEstimate estimate_;
   bool speed_known_ = false;  // since the last angle
   int64_t speed_at_ = 0;
-  double torque_estimate_ = std::numeric_limits<double>::quiet_NaN();
+  double torque_estimate_ = kNaN;
   MotorReadings readings_;
   uint32_t errors_ = 0;
   uint32_t version_ = 0;

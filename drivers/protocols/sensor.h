@@ -2,11 +2,11 @@
 
 #include <array>
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <string_view>
 #include <vector>
 
+#include "common/special_numbers.h"
 #include "drivers/can/transport.h"
 #include "drivers/protocols/bus_device.h"
 #include "drivers/protocols/motor.h"
@@ -25,8 +25,8 @@ enum class SensorState : int8_t {
 /// Of an encoder, at its shaft. Turns are counted from the first reading after Start, which is
 /// within half a turn (or half the turns that it can tell apart) of 0.
 struct EncoderReading {
-  double position = 0;                                         ///< [rad]
-  double velocity = std::numeric_limits<double>::quiet_NaN();  ///< [rad/s]; NaN if it reports none
+  double position = 0;     ///< [rad]
+  double velocity = kNaN;  ///< [rad/s]; NaN if it reports none
 };
 
 /// Of an inertial measurement unit, in its own axes, all of one instant.

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "calibrator/motion/log.h"
-#include "examples/mujoco/parameters.h"
+#include "parameters.h"
 #include "robot/description.h"
 
 /// MuJoCo as a simulator of a robot's recorded steps, of hinges and slides. Not thread-safe.

@@ -13,7 +13,7 @@
 
 #include "calibrator/motion/csv_log.h"
 #include "common/random.h"
-#include "examples/mujoco/next_states.h"
+#include "next_states.h"
 #include "sim/tasks/task.h"
 
 namespace {

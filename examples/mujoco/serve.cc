@@ -12,7 +12,7 @@
 #include "calibrator/motion/csv_log.h"
 #include "common/listen_address.h"
 #include "common/process.h"
-#include "examples/mujoco/next_states.h"
+#include "next_states.h"
 #include "umbridge/server.h"
 
 namespace {

@@ -1,8 +1,7 @@
 #pragma once
 
-#include <limits>
-
 #include "common/config.h"
+#include "common/special_numbers.h"
 
 namespace plumb {
 
@@ -46,14 +45,14 @@ struct EstimatorSettings {
 
 /// A joint's or a sensor's own noise in robot.toml; NaN = not given. Units as in EstimatorSettings.
 struct NoiseDescription {
-  double position_sd = std::numeric_limits<double>::quiet_NaN();
-  double velocity_sd = std::numeric_limits<double>::quiet_NaN();
-  double jerk = std::numeric_limits<double>::quiet_NaN();
-  double effort_step = std::numeric_limits<double>::quiet_NaN();
-  double ground_impact = std::numeric_limits<double>::quiet_NaN();
-  double stop_impact = std::numeric_limits<double>::quiet_NaN();
-  double coupling = std::numeric_limits<double>::quiet_NaN();
-  double delay = std::numeric_limits<double>::quiet_NaN();
+  double position_sd = kNaN;
+  double velocity_sd = kNaN;
+  double jerk = kNaN;
+  double effort_step = kNaN;
+  double ground_impact = kNaN;
+  double stop_impact = kNaN;
+  double coupling = kNaN;
+  double delay = kNaN;
 };
 
 /// @param robot with links, joints, sensors and simulation. Thread-safe. @throws ConfigError

@@ -21,9 +21,9 @@ Eigen::Vector3d ToVector(const std::vector<double>& numbers) {
   return Eigen::Vector3d(numbers.data());
 }
 
-// About the fixed axes x, then y, then z. Normalised first as ROS's urdfdom does and then as Eigen
-// does: what is known of a robot by its fingerprint depends on the last bit.
-Eigen::Matrix3d FromRollPitchYaw(const Eigen::Vector3d& rpy) {
+// As FromRollPitchYaw, but to the last bit as ROS's urdfdom has it, then normalised again as Eigen
+// does: what is known of a robot by its fingerprint depends on it.
+Eigen::Matrix3d UrdfdomRotation(const Eigen::Vector3d& rpy) {
   const double sx = std::sin(rpy.x() / 2), sy = std::sin(rpy.y() / 2), sz = std::sin(rpy.z() / 2);
   const double cx = std::cos(rpy.x() / 2), cy = std::cos(rpy.y() / 2), cz = std::cos(rpy.z() / 2);
   const double x = sx * cy * cz - cx * sy * sz, y = cx * sy * cz + sx * cy * sz,
@@ -75,7 +75,7 @@ class ElementReader {
     if (!origin) return pose;
     if (origin->Attribute("xyz")) pose.at = ToVector(xml_.Numbers(*origin, "xyz", 3, kSane));
     if (origin->Attribute("rpy"))
-      pose.axes = FromRollPitchYaw(ToVector(xml_.Numbers(*origin, "rpy", 3, kSane)));
+      pose.axes = UrdfdomRotation(ToVector(xml_.Numbers(*origin, "rpy", 3, kSane)));
     return pose;
   }
 

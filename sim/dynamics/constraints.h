@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <limits>
 #include <vector>
 
 #include "sim/dynamics/contact.h"
+#include "sim/dynamics/joint_constraints.h"
 #include "sim/dynamics/link_contacts.h"
 #include "sim/dynamics/physics.h"
 #include "sim/dynamics/sparse_cholesky.h"
@@ -28,7 +28,8 @@ template <class Real, template <class> class Tree>
 class Constraints {
  public:
   /// [rad/s] or [m/s] below which joint friction is viscous
-  static constexpr double kStickSpeed = 0.01;
+  static constexpr double kStickSpeed =
+      JointConstraints<Real, Tree<Real>::kTangents == 2>::kStickSpeed;
 
   static constexpr int kFewestTrials = 2,
                        kMaxTrials = Tree<Real>::kTangents == 2 ? 8 : 4;  ///< then it goes on as is
@@ -36,13 +37,9 @@ class Constraints {
   /// @param rubs, stops whether any joint may have friction, or stops.
   Constraints(const Topology& topology, bool rubs, bool stops)
       : topology_(topology),
-        rubs_(rubs),
-        stops_(stops),
         n_(static_cast<size_t>(topology.velocities)),
         shift_(n_),
-        rubbed_(n_),
-        pushed_(n_),
-        outcome_(n_),
+        joints_(topology, rubs, stops),
         links_(topology),
         contacts_(topology.points.size() + links_.size()),
         rows_(contacts_.size() * kRows * n_),
@@ -58,29 +55,12 @@ class Constraints {
     }
   }
 
-  /// Where the substep stands. Positions are those at which forces are evaluated, `ahead` seconds
-  /// before its end.
-  struct Substep {
-    const Physics<Real>& physics;
-    const Real* q;
-    const Real* v;
-    const Real* friction;  ///< [Nm] or [N] of each joint's Coulomb friction, if there is any
-    Real h, ahead;
-  };
+  using Substep = ConstrainedSubstep<Real>;
 
   /// Looks which constraints act if the velocities become `trial`. False: none does, and nothing
   /// need be assembled.
   bool Find(const Substep& now, const Tree<Real>& tree, const Real* trial) {
-    bool any = rubs_;
-    first_ = true;
-    std::fill(rubbed_.begin(), rubbed_.end(), Real{});
-    std::fill(pushed_.begin(), pushed_.end(), Real{});
-    for (const Topology::Joint& joint : topology_.joints) {
-      if (any || !HasStop(joint)) continue;
-      Real depth, sign;
-      StopDepth(joint, now.q, &depth, &sign);
-      any = Any(depth - now.ahead * sign * trial[joint.velocity] > 0);
-    }
+    bool any = joints_.Find(now, trial);
     for (size_t p = 0; p < topology_.points.size(); ++p) {
       tree.Jacobian(now.physics, p, &rows_[p * kRows * n_]);
       any = Begin(now, p, -tree.Height(now.physics, p), trial) || any;
@@ -98,11 +78,8 @@ class Constraints {
   void Foresee(const Substep& now, const Real* trial, const SparseCholesky<Real>& cholesky,
                const Real* factors) {
     std::fill(shift_.begin(), shift_.end(), Real{});
-    bool rubs = rubs_;
-    for (size_t i = 0; rubs_ && i < n_; ++i) {
-      const Real full = trial[i] < 0 ? Real(-now.friction[i]) : now.friction[i];
-      shift_[i] = now.h * (full - pushed_[i] - rubbed_[i] * trial[i]);
-    }
+    bool rubs = joints_.rubs();
+    joints_.FindMoreFriction(now, trial, shift_.data());
     for (size_t p = 0; p < contacts_.size(); ++p) {
       Contact& contact = contacts_[p];
       contact.outcome = Max(contact.speed, now.physics.world.contact.slip_speed);
@@ -119,10 +96,7 @@ class Constraints {
     }
     if (!rubs) return;
     cholesky.Solve(topology_.pattern, factors, shift_.data());
-    for (size_t i = 0; rubs_ && i < n_; ++i) {
-      const Real taken = trial[i] < 0 ? Real(-shift_[i]) : shift_[i];
-      outcome_[i] = Max(Real(Abs(trial[i]) - taken), Real{} + kStickSpeed);
-    }
+    joints_.Foresee(trial, shift_.data());
     for (size_t p = 0; p < contacts_.size(); ++p) {
       Contact& contact = contacts_[p];
       if (!contact.any) continue;
@@ -135,33 +109,7 @@ class Constraints {
   /// Adds what acts to the matrix (lower triangle, row by row) and to the right-hand side.
   void Assemble(const Substep& now, const Real* trial, Real* matrix, Real* rhs) {
     const WorldOf<Real>& world = now.physics.world;
-    for (size_t i = 0; rubs_ && i < n_; ++i) {
-      rubbed_[i] = now.friction[i] / outcome_[i];
-      if constexpr (kSlides) {
-        // What is foreseen once is then held to what has come of it: others have changed, too.
-        const Truth slid = Abs(pushed_[i]) > 0,
-                    still = slid ? pushed_[i] * trial[i] >= 0 : Abs(trial[i]) > kStickSpeed,
-                    slides = first_ ? outcome_[i] > kStickSpeed : still;
-        const Real full = trial[i] < 0 ? Real(-now.friction[i]) : now.friction[i];
-        rubbed_[i] = slides ? Real{} : rubbed_[i];
-        pushed_[i] = slides ? full : Real{};
-        rhs[i] -= now.h * pushed_[i];
-      }
-      matrix[i * n_ + i] += now.h * rubbed_[i];
-      rhs[i] -= now.h * rubbed_[i] * now.v[i];
-    }
-    first_ = false;
-    for (const Topology::Joint& joint : topology_.joints) {
-      if (!HasStop(joint)) continue;
-      const auto i = static_cast<size_t>(joint.velocity);
-      Real depth, sign;
-      StopDepth(joint, now.q, &depth, &sign);
-      const Real slope = world.stop.stiffness * now.ahead + world.stop.damping;
-      const Real force = world.stop.stiffness * depth - slope * sign * trial[i];
-      const Truth acts = (depth - now.ahead * sign * trial[i] > 0) & (force > 0);
-      matrix[i * n_ + i] += acts ? now.h * slope : Real{};
-      rhs[i] += acts ? now.h * (sign * world.stop.stiffness * depth - slope * now.v[i]) : Real{};
-    }
+    joints_.Assemble(now, trial, matrix, rhs);
     for (size_t p = 0; p < contacts_.size(); ++p) {
       Contact& contact = contacts_[p];
       if (!contact.any) continue;
@@ -181,12 +129,7 @@ class Constraints {
   /// outside the cone of friction.
   Mask<Real> Judge(const Substep& now, const Real* trial) {
     constexpr double kSlack = 1.02;
-    Truth settled = Real{} < 1;
-    for (size_t i = 0; kSlides && rubs_ && i < n_; ++i) {
-      const Truth beyond = rubbed_[i] * Abs(trial[i]) > kSlack * now.friction[i],
-                  back = pushed_[i] * trial[i] < 0;
-      settled = settled & (beyond == 0) & (back == 0);
-    }
+    Truth settled = joints_.Judge(now, trial, kSlack);
     for (size_t p = 0; p < contacts_.size(); ++p) {
       Contact& contact = contacts_[p];
       if (!contact.near) continue;
@@ -285,19 +228,6 @@ class Constraints {
     return now.physics.world.contact.stiffness * now.ahead + now.physics.world.contact.damping;
   }
 
-  bool HasStop(const Topology::Joint& joint) const {
-    return stops_ && joint.upper < std::numeric_limits<double>::infinity() &&
-           joint.type != JointDescription::Type::kSpherical;
-  }
-
-  // How far the joint is beyond its nearer limit, and which way that pushes.
-  void StopDepth(const Topology::Joint& joint, const Real* q, Real* depth, Real* sign) const {
-    const Real below = joint.lower - q[joint.position], above = q[joint.position] - joint.upper;
-    const Truth low = below > above;
-    *depth = low ? below : above;
-    *sign = low ? Real{} + 1 : Real{} - 1;
-  }
-
   // force = at_rest - slope * row . (v + dv), acting along the row
   void AddForce(const Substep& now, size_t point, size_t direction, const Real& at_rest,
                 const Real& slope, Real* matrix, Real* rhs) const {
@@ -316,13 +246,9 @@ class Constraints {
   }
 
   const Topology& topology_;
-  bool rubs_, stops_;
   size_t n_;
-  std::vector<Real> shift_;  // of the velocities, by friction
-  // Of joints in the latest trial: friction per speed where they stick, friction where they slide,
-  // and the speed that it will leave.
-  std::vector<Real> rubbed_, pushed_, outcome_;
-  bool first_ = true;  // no trial has been assembled yet
+  std::vector<Real> shift_;                 // of the velocities, by friction
+  JointConstraints<Real, kSlides> joints_;  // their stops and friction
   LinkContacts<Real> links_;
   std::vector<Contact> contacts_;  // of points with the ground, then of links with each other
   std::vector<Real> rows_;         // the contacts' Jacobians

@@ -6,8 +6,10 @@
 
 #include "robot/drive_effort.h"
 #include "sim/dynamics/constraints.h"
+#include "sim/dynamics/integrate_positions.h"
 #include "sim/dynamics/motor.h"
 #include "sim/dynamics/physics.h"
+#include "sim/dynamics/sensor_readings.h"
 #include "sim/dynamics/sparse_cholesky.h"
 #include "sim/dynamics/topology.h"
 
@@ -135,22 +137,13 @@ class Stepper {
   /// q, v are readings of sensors (JointDynamics): makes them the state that these are of, to
   /// second order in the delay, and back.
   void FromReading(const Real* effort) {
-    ForEachReading(
-        [&](Real& position, Real&, const auto& axis, size_t) { position -= axis.sensor_bias; });
+    RemoveSensorBias(topology_, physics, q.data(), v.data());
     const Real* acceleration = Felt(effort);
-    ForEachReading([&](Real& position, Real& velocity, const auto& axis, size_t i) {
-      const Real t = axis.sensor_delay;
-      position += t * velocity + 0.5 * t * t * acceleration[i];
-      velocity += t * acceleration[i];
-    });
+    RemoveSensorDelay(topology_, physics, acceleration, q.data(), v.data());
   }
   void ToReading(const Real* effort) {
     const Real* acceleration = Felt(effort);
-    ForEachReading([&](Real& position, Real& velocity, const auto& axis, size_t i) {
-      const Real t = axis.sensor_delay;
-      position += axis.sensor_bias - t * velocity + 0.5 * t * t * acceleration[i];
-      velocity -= t * acceleration[i];
-    });
+    AddSensorErrors(topology_, physics, acceleration, q.data(), v.data());
   }
 
   Physics<Real> physics;  // the robot; first, as it is aligned the most. Its sizes are fixed
@@ -288,53 +281,8 @@ class Stepper {
     }
   }
 
-  // q += h velocity
   void Move(const Real& h, const Real* velocity) {
-    if (topology_.positions == topology_.velocities) {
-      for (size_t i = 0; i < n_; ++i) q[i] += h * velocity[i];
-      return;
-    }
-    for (const Topology::Joint& joint : topology_.joints) {
-      Real* position = &q[static_cast<size_t>(joint.position)];
-      const Real* speed = velocity + joint.velocity;
-      if (joint.type == JointDescription::Type::kSpherical) {
-        Turn(h, speed, position);
-      } else {
-        position[0] += h * speed[0];
-      }
-    }
-  }
-
-  // Quaternion times the exponential of half the angle turned: exact for constant angular velocity
-  // in link axes.
-  static void Turn(const Real& h, const Real* spin, Real* quaternion) {
-    const Real speed = Sqrt(Real(spin[0] * spin[0] + spin[1] * spin[1] + spin[2] * spin[2]));
-    const Real half = 0.5 * h * speed;
-    Real sine, cosine;
-    SinCos(half, &sine, &cosine);
-    const Truth moves = speed > 0;
-    const Real share = moves ? Real(sine / (moves ? speed : Real{} + 1)) : Real{};
-    const Real a = quaternion[0], b = quaternion[1], c = quaternion[2], d = quaternion[3];
-    const Real x = share * spin[0], y = share * spin[1], z = share * spin[2];
-    const Real w1 = a * cosine - b * x - c * y - d * z;
-    const Real x1 = a * x + b * cosine + c * z - d * y;
-    const Real y1 = a * y - b * z + c * cosine + d * x;
-    const Real z1 = a * z + b * y - c * x + d * cosine;
-    const Real length = Sqrt(Real(w1 * w1 + x1 * x1 + y1 * y1 + z1 * z1));
-    // A lane that does not turn keeps its bits: it may be here for another lane's sake.
-    quaternion[0] = moves ? Real(w1 / length) : a;
-    quaternion[1] = moves ? Real(x1 / length) : b;
-    quaternion[2] = moves ? Real(y1 / length) : c;
-    quaternion[3] = moves ? Real(z1 / length) : d;
-  }
-
-  template <class Change>
-  void ForEachReading(Change change) {
-    for (const Topology::Joint& joint : topology_.joints) {
-      if (joint.type == JointDescription::Type::kSpherical) continue;
-      const auto i = static_cast<size_t>(joint.velocity);
-      change(q[static_cast<size_t>(joint.position)], v[i], physics.axes[i], i);
-    }
+    IntegratePositions(topology_, h, velocity, q.data());
   }
 };
 

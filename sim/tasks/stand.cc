@@ -3,6 +3,8 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "robot/roll_pitch_yaw.h"
+
 namespace plumb {
 namespace {
 
@@ -22,12 +24,9 @@ StandTask::StandTask(const RobotDescription& description)
 
 void StandTask::InitialState(Random& random, Eigen::Ref<Eigen::VectorXd> q,
                              Eigen::Ref<Eigen::VectorXd> v) const {
-  using Eigen::AngleAxisd, Eigen::Vector3d;
   const double heading = random.Uniform(-std::numbers::pi, std::numbers::pi);
   const double pitch = random.Uniform(-kLean, kLean), roll = random.Uniform(-kLean, kLean);
-  const Eigen::Quaterniond turned = AngleAxisd(heading, Vector3d::UnitZ()) *
-                                    AngleAxisd(pitch, Vector3d::UnitY()) *
-                                    AngleAxisd(roll, Vector3d::UnitX());
+  const Eigen::Quaterniond turned = FromRollPitchYaw({roll, pitch, heading});
   q.head<7>() << 0, 0, standing_height() + kDrop, turned.w(), turned.vec();
   v.setZero();
   const Eigen::Index joints = rest().size();

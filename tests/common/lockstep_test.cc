@@ -15,6 +15,7 @@
 #include "common/clock.h"
 #include "common/lockstep/coordinator.h"
 #include "common/lockstep/packet_socket.h"
+#include "common/message_bytes.h"
 #include "plumb/lockstep_grant_t.hpp"
 #include "plumb/lockstep_hello_t.hpp"
 #include "tests/temporary_folder.h"

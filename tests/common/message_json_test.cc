@@ -4,8 +4,10 @@
 #include <cstdio>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 
+#include "common/message_bytes.h"
 #include "common/message_scalars.h"
 #include "common/message_schema.h"
 #include "common/message_walk.h"
@@ -61,13 +63,6 @@ std::vector<Sample> ReadSamples() {
 const std::vector<Sample>& Samples() {
   static const std::vector<Sample> samples = ReadSamples();
   return samples;
-}
-
-template <class Message>
-Bytes Encode(const Message& message) {
-  Bytes bytes(static_cast<size_t>(message.getEncodedSize()));
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return bytes;
 }
 
 std::string Json(const MessageType& type, std::span<const uint8_t> bytes) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/message_bytes.h"
 #include "dashboard/gateway.h"
 #include "plumb/driver_status_t.hpp"
 #include "plumb/training_status_t.hpp"
@@ -24,13 +25,6 @@ inline std::string Source() {
 inline const RobotDescription& Pendulum() {
   static const RobotDescription robot = LoadRobot(Source() + "/robots/pendulum");
   return robot;
-}
-
-template <class Message>
-std::vector<uint8_t> Encode(const Message& message) {
-  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return bytes;
 }
 
 /// A gateway, what it asks the driver for, and its time.

@@ -19,10 +19,7 @@ TEST_CASE("Of several starts none learns from another, and the best policy goes 
   Trainer trainer = make(settings), resumed = make(settings);
   settings.starts = 1;
   Trainer single = make(settings);
-  const auto update = [](Trainer& t) {
-    if (t.JudgementDue()) t.Judge(GymParameters);
-    t.Update(GymParameters);
-  };
+  const auto update = [](Trainer& t) { t.UpdateJudged(GymParameters); };
   for (int i = 0; i < 3; ++i) update(trainer), update(single);
   CHECK(trainer.policy().parameters == single.policy().parameters);
   CHECK(trainer.state().critic.parameters == single.state().critic.parameters);

@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "calibrator/fit/estimated_noise.h"
 #include "calibrator/motion/still_readings.h"
 #include "calibrator/results/summary.h"
 #include "sim/simulator.h"

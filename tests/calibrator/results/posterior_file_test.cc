@@ -175,14 +175,6 @@ TEST_CASE("without samples the numbers are drawn from the mixture") {
   CHECK(Summarise(findings, robot).mean == summary.mean);
 }
 
-TEST_CASE("quantiles are interpolated") {
-  CHECK(Quantile({1, 2, 4}, 0.5) == 2);
-  CHECK(Quantile({1, 2, 4}, 0.75) == 3);
-  CHECK(Quantile({1, 2, 4}, 1) == 4);
-  CHECK(Quantile({7}, 0.3) == 7);
-  CHECK(std::isnan(Quantile({}, 0.5)));
-}
-
 TEST_CASE("findings that are none are not written") {
   const RobotDescription robot = Pendulum();
   const auto why = [&](const std::function<void(Findings&)>& spoil) -> std::string {

@@ -14,18 +14,6 @@ namespace {
 
 using Catch::Contains;
 
-TEST_CASE("bits of a frame") {
-  // DLC, standard nominal and worst, extended nominal and worst.
-  const int table[][5] = {{0, 47, 55, 67, 80},    {1, 55, 65, 75, 90},     {4, 79, 95, 99, 120},
-                          {6, 95, 115, 115, 140}, {7, 103, 125, 123, 150}, {8, 111, 135, 131, 160}};
-  for (const auto& [length, nominal, worst, extended, extended_worst] : table) {
-    CHECK(NominalBits(false, length) == nominal);
-    CHECK(WorstCaseBits(false, length) == worst);
-    CHECK(NominalBits(true, length) == extended);
-    CHECK(WorstCaseBits(true, length) == extended_worst);
-  }
-}
-
 TEST_CASE("a leg at 500 Hz fits: loads and response times as computed by hand") {
   const BusPlan plan = PlanBus(Leg(2'000, 2'000, 5'000), 1e6);
   CHECK(plan.errors.empty());

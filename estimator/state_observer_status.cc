@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <limits>
 
+#include "common/special_numbers.h"
 #include "common/time_units.h"
 #include "estimator/state_observer.h"
 
@@ -13,7 +13,6 @@ namespace {
 
 using Finding = AgreementWatch::Finding;
 
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr double kSurelyBiased = 4;  // times what its bias may be
 
 std::string OfVelocity(const AgreementWatch& watch, Finding found, const char* rate) {
@@ -64,11 +63,11 @@ estimator_status_t StateObserver::Status() const {
   status.num_joints = static_cast<int32_t>(joints_.size());
   for (const Joint& joint : joints_) {
     status.joint_name.push_back(joint.name);
-    status.age.push_back(joint.used < 0 ? kNone : Seconds(state_.utime - joint.used));
+    status.age.push_back(joint.used < 0 ? kNaN : Seconds(state_.utime - joint.used));
     status.position_nis.push_back(joint.position_nis.value());
     status.velocity_nis.push_back(joint.velocity_nis.value());
     status.acceleration_nis.push_back(joint.acceleration_nis.value());
-    status.bias.push_back(joint.settings.bias_sd > 0 ? joint.filter.bias() : kNone);
+    status.bias.push_back(joint.settings.bias_sd > 0 ? joint.filter.bias() : kNaN);
     status.joint_reason.push_back(SensorReason(joint));
     if (status.reason.empty() && joint.out) {
       status.reason =
