@@ -15,7 +15,7 @@ Log ReadLog(const std::string& bytes, const RobotDescription& robot = Pendulum()
   return ReadLcmLog(TemporaryFile(bytes, ".lcmlog").path(), robot);
 }
 
-std::string Refusal(const std::string& bytes) {
+std::string LogRefusal(const std::string& bytes) {
   const TemporaryFile file(bytes, ".lcmlog");
   try {
     ReadLcmLog(file.path(), Pendulum());
@@ -225,7 +225,7 @@ TEST_CASE("a log that is of no use is refused with the reason") {
   };
   for (const Case& c : cases) {
     INFO(c.name);
-    CHECK(Refusal(c.bytes) == c.refusal);
+    CHECK(LogRefusal(c.bytes) == c.refusal);
   }
   CHECK_THROWS_WITH(ReadLcmLog("/nonexistent/run.lcmlog", Pendulum()),
                     "/nonexistent/run.lcmlog: cannot be opened");
