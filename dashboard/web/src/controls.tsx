@@ -51,7 +51,9 @@ export function Outcome() {
     <div class="outcome" role="status" aria-live="assertive">
       {now && (
         <p class={now.state}>
-          <b>{now.what}</b>: {now.text}
+          <span>
+            <b>{now.what}</b>: {now.text}
+          </span>
           {now.state !== "asked" && <button class="quiet" aria-label="Close this message" onClick={() => (outcome.value = null)}>×</button>}
         </p>
       )}
