@@ -95,7 +95,7 @@ class Fuzzed(unittest.TestCase):
         self.assertIn(b"<title>page</title>", client.get(self.dashboard.address, "/"))
         self.assertIn("no driver answers", self.watcher.call("emergency_stop")["text"])
         self.dashboard.works(self)
-        self.assertLess(self.dashboard.peak(), 100)
+        self.dashboard.require_memory_below(self, 100)
 
     def test_requests(self):
         host = f"Host: 127.0.0.1:{self.dashboard.address[1]}\r\n".encode()
