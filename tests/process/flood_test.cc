@@ -180,8 +180,10 @@ TEST_CASE("the trainer's memory has a bound while it trains") {
   CHECK(bytes > size_t{400'000'000});
   CHECK(lost("PARAMETER_DISTRIBUTION"));
   CHECK(lost("CONTROLLER_STATUS"));
+#if !defined(__SANITIZE_THREAD__) && !defined(__SANITIZE_ADDRESS__)  // whose own memory counts
   // Two queues of 32 MB, and what the allocator keeps of them.
   CHECK(grown < 100'000);
+#endif
   CHECK(trainer.running());
 }
 
