@@ -92,9 +92,9 @@ void JournalWitness::JudgeRollouts(int64_t time, const SimOpt::State& journal) {
   // None of a policy's episodes is missing.
   auto rollout = journal.rollouts.begin();
   for (int policy = 0; policy < journal.iteration; ++policy) {
-    std::vector<int64_t> episodes;
-    for (int i = 0; i < journal.rollouts_per_iteration[static_cast<size_t>(policy)]; ++i)
-      episodes.push_back((rollout++)->episode);
+    const int count = journal.rollouts_per_iteration[static_cast<size_t>(policy)];
+    std::vector<int64_t> episodes(static_cast<size_t>(count));
+    for (int64_t& episode : episodes) episode = (rollout++)->episode;
     if (completed[policy].contains(episodes)) continue;
     chronicle_.Violate(4, time,
                        fmt::format("of policy {} the episodes {} count, which are not those that "

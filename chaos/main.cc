@@ -119,15 +119,12 @@ int PlayAll(const Flags& flags) {
   return violated == 0 ? 0 : 1;
 }
 
-}  // namespace
-}  // namespace plumb
-
-int main(int argc, char** argv) {
-  plumb::Flags flags;
+int PlayWhatIsAsked(int argc, char** argv) {
+  Flags flags;
   flags.seeds = "1";
   CLI::App app{"Runs the whole stack in virtual time and does it mischief, the same for a seed.",
                "plumb-chaos"};
-  plumb::TrialSetting& setting = flags.setting;
+  TrialSetting& setting = flags.setting;
   app.add_option("robot", setting.robot, "robot folder or TOML file, with motors of CANSimple")
       ->required();
   app.add_option("--seed,--seeds", flags.seeds, "one seed, or FIRST:LAST")->capture_default_str();
@@ -147,17 +144,24 @@ int main(int argc, char** argv) {
   app.add_flag("--first", flags.first, "stop at the first seed that violates something");
   app.add_flag("--verbose", flags.verbose, "print what the monkey does");
   app.add_option("--keep", flags.keep, "a folder to leave each seed's logs and checkpoints in");
-  plumb::AddExamples(app, {"plumb-chaos robots/pendulum --seed 7 --verbose",
-                           "plumb-chaos robots/pendulum --seeds 1:200 --first"});
-  app.set_version_flag("--version", plumb::VersionLine("plumb-chaos"));
+  AddExamples(app, {"plumb-chaos robots/pendulum --seed 7 --verbose",
+                    "plumb-chaos robots/pendulum --seeds 1:200 --first"});
+  app.set_version_flag("--version", VersionLine("plumb-chaos"));
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
   spdlog::set_level(spdlog::level::off);  // whom we do not believe is part of the game
+  return PlayAll(flags);
+}
+
+}  // namespace
+}  // namespace plumb
+
+int main(int argc, char** argv) {
   try {
-    return plumb::PlayAll(flags);
+    return plumb::PlayWhatIsAsked(argc, argv);
   } catch (const std::exception& error) {
     std::cerr << "plumb-chaos: " << error.what() << std::endl;
     return 2;

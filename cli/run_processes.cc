@@ -62,7 +62,7 @@ std::string RunProcesses::StartDashboard() {
   if (coordinator_) arguments.push_back("--virtual");
   dashboard_.emplace(kName, Command(kName, arguments, coordinator_ ? "1" : where_.clock),
                      where_.output / (std::string(kName) + ".log"));
-  const std::string said = WaitForLine(*dashboard_, kSays);
+  std::string said = WaitForLine(*dashboard_, kSays);
   if (!said.empty()) return said;
   const std::string why = dashboard_->Tail(1);
   return "no dashboard: " + why.substr(0, why.find_last_not_of(" \n") + 1);

@@ -68,6 +68,7 @@ std::vector<Item> Chosen(const std::array<Item, count>& all, const std::vector<s
 template <class Item, size_t count>
 CLI::Validator OneOf(const std::array<Item, count>& all) {
   std::vector<std::string> keys;
+  keys.reserve(count);
   for (const Item& item : all) keys.emplace_back(item.key);
   return CLI::IsMember(keys);
 }

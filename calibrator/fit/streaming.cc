@@ -108,6 +108,7 @@ double StreamingLaplace::DistanceFrom(const Eigen::VectorXd& at) const {
 // All at the mode, side by side.
 void StreamingLaplace::Linearise(const std::vector<size_t>& indices) {
   std::vector<const ObservedTransition*> transitions;
+  transitions.reserve(indices.size());
   for (const size_t i : indices) transitions.push_back(&pieces_[i].transition);
   std::vector<Eigen::MatrixXd> errors = errors_.Linearise(rollouts_, transitions, mode_, noise_sd_);
   for (size_t k = 0; k < indices.size(); ++k) {

@@ -25,13 +25,13 @@ int Serve(plumb::Process& process, const Flags& flags) {
   const plumb::RobotDescription robot = plumb::LoadRobot(flags.robot);
   const plumb::Log log = plumb::ReadCsvLog(flags.motion, robot);
   MujocoSteps mujoco(robot, flags.xml);
+  const Eigen::Index transitions = static_cast<Eigen::Index>(plumb::CountTransitions(log.rollouts)),
+                     outputs = 2 * transitions * robot.num_velocities();
   const auto evaluate = [&](const Eigen::MatrixXd& parameters) {
     std::vector<Eigen::VectorXd> columns;
     for (const auto& column : parameters.colwise()) {
       mujoco.SetParameters(column);
-      Eigen::VectorXd& states =
-          columns.emplace_back(2 * robot.num_velocities() *
-                               static_cast<Eigen::Index>(plumb::CountTransitions(log.rollouts)));
+      Eigen::VectorXd& states = columns.emplace_back(outputs);
       Eigen::Index at = 0;
       for (const plumb::Rollout& rollout : log.rollouts) {
         for (const plumb::Transition& t : rollout.transitions) {
@@ -43,14 +43,11 @@ int Serve(plumb::Process& process, const Flags& flags) {
         }
       }
     }
-    Eigen::MatrixXd outputs(columns.front().size(), parameters.cols());
-    for (size_t j = 0; j < columns.size(); ++j)
-      outputs.col(static_cast<Eigen::Index>(j)) = columns[j];
-    return outputs;
+    Eigen::MatrixXd all(outputs, parameters.cols());
+    for (size_t j = 0; j < columns.size(); ++j) all.col(static_cast<Eigen::Index>(j)) = columns[j];
+    return all;
   };
   const auto listen = plumb::ListenAddress::Parse(flags.address);
-  const Eigen::Index outputs =
-      2 * robot.num_velocities() * static_cast<Eigen::Index>(plumb::CountTransitions(log.rollouts));
   plumb::UmbridgeServer server(
       listen, {},
       {{"next_states", static_cast<Eigen::Index>(robot.parameters.size()), outputs, evaluate}});

@@ -41,6 +41,7 @@ std::string Repr(const ParameterDescription& parameter) {
 template <class Items>
 std::vector<std::string> NamesOf(const Items& items) {
   std::vector<std::string> names;
+  names.reserve(items.size());
   for (const auto& item : items) names.push_back(item.name);
   return names;
 }

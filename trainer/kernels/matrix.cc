@@ -1,6 +1,7 @@
 #include "trainer/kernels/matrix.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cstdlib>
 #include <cstring>
 #include <new>
@@ -125,6 +126,7 @@ void Matrix::Free::operator()(float* data) const { std::free(data); }
 
 void Multiply(int m, int n, int k, LeftFactor a, RightFactor b, float* c, ptrdiff_t c_stride,
               Onto onto, const float* bias) {
+  assert(onto != Onto::kBias || bias);
   const Problem problem{k, a, b, c_stride, onto};
   if (n == 1) {
     const int i = Bands<kTallRows, 1>(0, m, n, problem, c, bias);
