@@ -119,7 +119,7 @@ int PlayAll(const Flags& flags) {
   return violated == 0 ? 0 : 1;
 }
 
-int PlayWhatIsAsked(int argc, char** argv) {
+int Main(int argc, char** argv) {
   Flags flags;
   flags.seeds = "1";
   CLI::App app{"Runs the whole stack in virtual time and does it mischief, the same for a seed.",
@@ -161,7 +161,7 @@ int PlayWhatIsAsked(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   try {
-    return plumb::PlayWhatIsAsked(argc, argv);
+    return plumb::Main(argc, argv);
   } catch (const std::exception& error) {
     std::cerr << "plumb-chaos: " << error.what() << std::endl;
     return 2;

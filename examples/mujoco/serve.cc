@@ -28,24 +28,21 @@ int Serve(plumb::Process& process, const Flags& flags) {
   const Eigen::Index transitions = static_cast<Eigen::Index>(plumb::CountTransitions(log.rollouts)),
                      outputs = 2 * transitions * robot.num_velocities();
   const auto evaluate = [&](const Eigen::MatrixXd& parameters) {
-    std::vector<Eigen::VectorXd> columns;
-    for (const auto& column : parameters.colwise()) {
-      mujoco.SetParameters(column);
-      Eigen::VectorXd& states = columns.emplace_back(outputs);
+    Eigen::MatrixXd next_states(outputs, parameters.cols());
+    for (Eigen::Index j = 0; j < parameters.cols(); ++j) {
+      mujoco.SetParameters(parameters.col(j));
       Eigen::Index at = 0;
       for (const plumb::Rollout& rollout : log.rollouts) {
         for (const plumb::Transition& t : rollout.transitions) {
           mujoco.SetState(t.q, t.v);
           mujoco.Step(t.efforts);
           const Eigen::VectorXd state = mujoco.State();
-          states.segment(at, state.size()) = state;
+          next_states.col(j).segment(at, state.size()) = state;
           at += state.size();
         }
       }
     }
-    Eigen::MatrixXd all(outputs, parameters.cols());
-    for (size_t j = 0; j < columns.size(); ++j) all.col(static_cast<Eigen::Index>(j)) = columns[j];
-    return all;
+    return next_states;
   };
   const auto listen = plumb::ListenAddress::Parse(flags.address);
   plumb::UmbridgeServer server(
