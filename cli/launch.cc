@@ -34,6 +34,11 @@ constexpr int64_t kPoll = 50'000;           // [us]
 constexpr int64_t kDoubt = 300'000;         // [us]; three statuses of the controller
 constexpr size_t kMaxStrangeChannels = 10;  // that are named: strangers choose how many there are
 
+int CalibrationsOf(const LaunchFlags& flags) {
+  if (!flags.policy.empty()) return 0;
+  return flags.efforts.empty() ? flags.iterations : 1;
+}
+
 /// One run: its processes and what they say.
 class ClosedLoop {
  public:
@@ -46,7 +51,7 @@ class ClosedLoop {
                    ? process.clock()
                    : Clock(flags.speed > 0 ? flags.speed : 1, process.clock().Utime())),
         start_(clock_.Now()),
-        progress_(robot_, flags.efforts.empty() ? flags.iterations : 1, !flags.efforts.empty()),
+        progress_(robot_, CalibrationsOf(flags), !flags.efforts.empty()),
         requests_(process.messenger(), "DRIVER_REQUEST"),
         drivers_(process.messenger(), "DRIVER_STATUS",
                  [&](const driver_status_t& m) { Account(), progress_.OnDriver(m); }),
@@ -80,7 +85,7 @@ class ClosedLoop {
       const int status = ArmByPerson();
       if (status != 0) return status;
     }
-    std::cout << progress_.Header() << std::endl;
+    if (flags_.policy.empty()) std::cout << progress_.Header() << std::endl;
     // In real time anybody might have said that it is finished: the controller, which repeats it,
     // is given the time to speak, and two speakers end the run.
     const int64_t doubt = setting_.virtual_run ? 0 : kDoubt;
@@ -201,6 +206,7 @@ class ClosedLoop {
 
   std::string GoesOn() const {
     const std::string output = setting_.output.string();
+    if (!flags_.policy.empty()) return "nothing was learnt; logs are in " + output;
     return "what was learnt is in " + output +
            ": the same command goes on from there with --output " + output;
   }

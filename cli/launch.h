@@ -11,7 +11,7 @@ namespace plumb {
 /// In a run's folder: where calibrator and trainer keep their checkpoints.
 inline constexpr char kCalibrationFolder[] = "calibration", kTrainingFolder[] = "training";
 
-/// The flags of `plumb launch`.
+/// The flags of `plumb launch`. At most one of `efforts` and `policy`.
 struct LaunchFlags {
   std::string robot = "robots/pendulum";
   uint64_t seed = 1;
@@ -19,6 +19,8 @@ struct LaunchFlags {
   int evaluation_episodes = 10;
   /// table of efforts to play once and calibrate with, without any policy; empty = the whole loop
   std::string efforts;
+  /// file of a policy to run, without learning anything; empty = the whole loop
+  std::string policy;
   std::vector<std::string> buses;  ///< see SetUrls; empty = the robot's own
   bool real_time = false;  ///< a virtual robot in real time; otherwise it runs in virtual time
   /// in real time scaled seconds per second, 0 = 1; in virtual time the most, 0 = no limit

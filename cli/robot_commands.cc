@@ -155,10 +155,15 @@ void AddLoopFlags(CLI::App& launch, LaunchFlags& flags) {
                                    "roll-outs of the final policy")
                        ->check(CLI::Range(1, 1000))
                        ->capture_default_str();
+  auto* efforts =
+      launch
+          .add_option("--efforts", flags.efforts,
+                      "instead of the loop: play this table of `plumb excite` once, calibrate")
+          ->excludes(iterations, episodes);
   launch
-      .add_option("--efforts", flags.efforts,
-                  "instead of the loop: play this table of `plumb excite` once, calibrate")
-      ->excludes(iterations, episodes);
+      .add_option("--policy", flags.policy,
+                  "instead of the loop: run this policy, an ONNX model or a trainer's checkpoint")
+      ->excludes(iterations, efforts);
 }
 
 /// Which robot it is, a virtual or a real one, by which clock it moves, and whom it obeys.

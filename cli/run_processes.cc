@@ -98,24 +98,23 @@ void RunProcesses::Start() {
   Start(kDriver, with_priority(driver, 0));
   Start("plumb-estimator", with_priority({flags_.robot}, 5));
   Start("plumb-controller", with_priority(controller, 5));
-  std::vector<std::string> calibrator{flags_.robot, "--seed", seed, "--checkpoint",
-                                      (where_.output / kCalibrationFolder).string()};
-  std::vector<std::string> trainer{flags_.robot,
-                                   "--seed",
-                                   seed,
-                                   "--iterations",
-                                   std::to_string(flags_.iterations),
-                                   "--evaluation-episodes",
-                                   std::to_string(flags_.evaluation_episodes),
-                                   "--checkpoint",
-                                   (where_.output / kTrainingFolder).string()};
   // In real time the slow loop gives way to the fast one.
-  if (!coordinator_) {
-    for (auto* arguments : {&calibrator, &trainer})
-      arguments->insert(arguments->end(), {"--nice", "10"});
+  const auto start_slow = [&](const std::string& name, std::vector<std::string> arguments) {
+    if (!coordinator_) arguments.insert(arguments.end(), {"--nice", "10"});
+    Start(name, arguments);
+  };
+  const std::string episodes = std::to_string(flags_.evaluation_episodes);
+  if (!flags_.policy.empty()) {
+    start_slow("plumb-trainer",
+               {flags_.robot, "--policy", flags_.policy, "--evaluation-episodes", episodes});
+    return;
   }
-  Start("plumb-calibrator", calibrator);
-  if (flags_.efforts.empty()) Start("plumb-trainer", trainer);
+  start_slow("plumb-calibrator", {flags_.robot, "--seed", seed, "--checkpoint",
+                                  (where_.output / kCalibrationFolder).string()});
+  if (!flags_.efforts.empty()) return;
+  start_slow("plumb-trainer", {flags_.robot, "--seed", seed, "--iterations",
+                               std::to_string(flags_.iterations), "--evaluation-episodes", episodes,
+                               "--checkpoint", (where_.output / kTrainingFolder).string()});
 }
 
 Child* RunProcesses::Ended() {

@@ -64,7 +64,7 @@ fs::path MakeRunFolder(const std::string& wanted) {
 void RequireProcessFiles(const Process& process, const LaunchFlags& flags,
                          const RobotDescription& robot) {
   std::vector<std::string> inputs = FilesOf(robot);
-  inputs.insert(inputs.end(), {process.key_file(), flags.efforts});
+  inputs.insert(inputs.end(), {process.key_file(), flags.efforts, flags.policy});
   const std::vector<std::string> outputs{flags.log, flags.can_log, flags.summary, flags.report};
   RequireNotRead(outputs, inputs);
   RequireApart(outputs);
@@ -119,7 +119,10 @@ RunSetting::RunSetting(const Process& process, const LaunchFlags& flags)
     robot.task.steps = static_cast<int>(played.rows());
     RequireKept(robot, flags.efforts);
   }
-  RequireSendable(robot);
+  if (flags.policy.empty())
+    RequireSendable(robot);
+  else
+    LoadSendablePolicy(flags.policy, robot);
   RequireKey(process.lcm_url(), !process.key_file().empty(), flags.allow_unsigned);
   if (flags.real && flags.speed != 0)
     throw std::invalid_argument("a real robot runs at its own speed, without --speed");
@@ -129,7 +132,7 @@ RunSetting::RunSetting(const Process& process, const LaunchFlags& flags)
   RequireFree(process.lcm_url(), robot.buses, flags.real);
   output = MakeRunFolder(flags.output);
   lock.emplace(output);
-  RequireOwn(output, robot, flags);
+  if (flags.policy.empty()) RequireOwn(output, robot, flags);
   for (const std::string& file : {flags.summary, flags.report}) {
     if (!file.empty()) RequireWritable(file);  // perhaps in that folder
   }

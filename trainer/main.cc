@@ -31,6 +31,7 @@ struct Options {
   int iterations = 10;
   uint64_t seed = 1;
   std::string checkpoint;
+  std::string policy;  // a file; empty = train one
   int threads = 0;
   int evaluation_episodes = 10;
 };
@@ -216,6 +217,27 @@ class TrainerProcess {
   int missed_ = -1;  // policy whose trial was not there when it was needed
 };
 
+/// Sends a policy of a file as the last one of a run would be sent, and trains nothing.
+int SendPolicy(Process& process, const Options& options) {
+  const RobotDescription robot = LoadRobot(options.robot);
+  policy_t message = LoadSendablePolicy(options.policy, robot).ToMessage();
+  message.iteration = message.trained_in = 0;
+  message.purpose = policy_t::EVALUATE;
+  message.episodes = options.evaluation_episodes;
+  message.trial_steps = 0;
+  process.messenger().Follow(robot.name);
+  Publisher<policy_t> publisher(process.messenger(), "POLICY");
+  spdlog::info("{}: sends {}, trains nothing", robot.name, options.policy);
+  Periodic repeat(kRepeat, process.clock().Now());
+  while (process.Wait(repeat.Remaining(process.clock().Now()))) {
+    if (!repeat.Due(process.clock().Now())) continue;
+    repeat.Advance(process.clock().Now());
+    message.utime = process.clock().Utime();
+    publisher.Publish(message);
+  }
+  return 0;
+}
+
 }  // namespace
 }  // namespace plumb
 
@@ -227,15 +249,18 @@ int main(int argc, char** argv) {
       argc, argv,
       [&](CLI::App& app) {
         app.add_option("robot", options.robot, "robot folder or TOML file")->required();
-        app.add_option("--iterations", options.iterations,
-                       "calibrations; the policy after the last is evaluated")
-            ->check(CLI::Range(0, 10000))
-            ->capture_default_str();
+        auto* iterations = app.add_option("--iterations", options.iterations,
+                                          "calibrations; the policy after the last is evaluated")
+                               ->check(CLI::Range(0, 10000))
+                               ->capture_default_str();
         app.add_option("--seed", options.seed, "of all random numbers")
             ->check(plumb::SeedRange())
             ->capture_default_str();
-        app.add_option("--checkpoint", options.checkpoint,
-                       "folder to checkpoint in and to resume from");
+        auto* checkpoint = app.add_option("--checkpoint", options.checkpoint,
+                                          "folder to checkpoint in and to resume from");
+        app.add_option("--policy", options.policy,
+                       "train nothing, send this policy: an ONNX model or a trainer's checkpoint")
+            ->excludes(iterations, checkpoint);
         app.add_option("--threads", options.threads, "0 = all processors")
             ->check(CLI::Range(0, 1024))
             ->capture_default_str();
@@ -243,7 +268,11 @@ int main(int argc, char** argv) {
                        "roll-outs of the last policy")
             ->check(CLI::Range(1, 1000000))
             ->capture_default_str();
-        plumb::AddExamples(app, {"plumb-trainer robots/pendulum --seed 3"});
+        plumb::AddExamples(app, {"plumb-trainer robots/pendulum --seed 3",
+                                 "plumb-trainer robots/pendulum --policy policy.onnx"});
       },
-      [&](plumb::Process& process) { return plumb::TrainerProcess(process, options).Run(); });
+      [&](plumb::Process& process) {
+        return options.policy.empty() ? plumb::TrainerProcess(process, options).Run()
+                                      : plumb::SendPolicy(process, options);
+      });
 }

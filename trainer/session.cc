@@ -16,6 +16,7 @@
 #include "common/special_numbers.h"
 #include "sim/residual_inputs.h"
 #include "sim/tasks/task.h"
+#include "trainer/policy_file.h"
 
 namespace plumb {
 namespace {
@@ -36,17 +37,34 @@ UpdateReport ReportOf(const training_status_t& status) {
 
 }  // namespace
 
-void RequireSendable(const RobotDescription& robot) {
-  const auto task = MakeTask(robot);
-  const GaussianPolicy policy(
-      {task->observation_size(), robot.training.hidden, task->action_size()});
+void RequireSendable(const GaussianPolicy& policy) {
   const double megabyte = 1 << 20;
   const auto size = static_cast<size_t>(policy.ToMessage().getEncodedSize()) + kSealSize;
   if (size <= kMaxLcmMessage) return;
   throw std::invalid_argument(fmt::format(
-      "[training] hidden: its policy is a message of {:.1f} MB, and what has more than {:.0f} MB "
-      "gets through to nobody: take fewer units",
+      "its policy is a message of {:.1f} MB, and what has more than {:.0f} MB gets through to "
+      "nobody: take fewer units",
       static_cast<double>(size) / megabyte, static_cast<double>(kMaxLcmMessage) / megabyte));
+}
+
+void RequireSendable(const RobotDescription& robot) {
+  const auto task = MakeTask(robot);
+  try {
+    RequireSendable(
+        GaussianPolicy({task->observation_size(), robot.training.hidden, task->action_size()}));
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument(fmt::format("[training] hidden: {}", error.what()));
+  }
+}
+
+GaussianPolicy LoadSendablePolicy(const std::string& file, const RobotDescription& robot) {
+  GaussianPolicy policy = LoadPolicy(file, robot, *MakeTask(robot));
+  try {
+    RequireSendable(policy);
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument(fmt::format("{}: {}", file, error.what()));
+  }
+  return policy;
 }
 
 TrainingSession::TrainingSession(const RobotDescription& description, const SimulationFactory& make,

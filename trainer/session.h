@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 
 #include "plumb/controller_status_t.hpp"
 #include "plumb/policy_t.hpp"
@@ -13,10 +14,15 @@
 
 namespace plumb {
 
-/// Whether the policy that [training] `hidden` makes can be sent: sealed it may have kMaxLcmMessage
-/// bytes. Thread-safe.
+/// Whether a policy, and the one that [training] `hidden` makes, can be sent: sealed it may have
+/// kMaxLcmMessage bytes. Both are thread-safe.
 /// @throws std::invalid_argument if it cannot, one line for people.
+void RequireSendable(const GaussianPolicy& policy);
 void RequireSendable(const RobotDescription& robot);
+
+/// The policy of a file, to be sent. @throws as LoadPolicy (trainer/policy_file.h) and
+/// RequireSendable, naming the file. Thread-safe.
+GaussianPolicy LoadSendablePolicy(const std::string& file, const RobotDescription& robot);
 
 /// The trainer's part of SimOpt: for each distribution of simulators a policy. Iteration 0 trains
 /// from scratch, each later one from where the last ended.

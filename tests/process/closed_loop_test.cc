@@ -45,6 +45,40 @@ TEST_CASE("an excitation is played on the robot and calibrated with, without any
   CHECK_THAT(refused.Tail(20), Contains("efforts.csv:2: u/pivot is 3: beyond the joint's effort"));
 }
 
+TEST_CASE("a policy of a file runs on the robot, and nothing is learnt") {
+  Stage stage(134, "pendulum", Stage::Time::kReal);
+  LearnLittle(stage);
+  Child learnt =
+      Launch(stage, {"--iterations", "1", "--evaluation-episodes", "1", "--seed", "3"}, "learnt");
+  Finish(stage, learnt);
+  const fs::path policy = stage.folder / "learnt" / "training" / "trainer.checkpoint",
+                 report = stage.folder / "report.html";
+  const auto play = [&](const std::string& name) {
+    const fs::path summary = stage.folder / (name + ".json");
+    Child launch = Launch(stage,
+                          {"--policy", policy, "--evaluation-episodes", "3", "--seed", "3",
+                           "--summary", summary, "--report", report},
+                          name);
+    CHECK_THAT(Finish(stage, launch), Contains("final policy on the robot, 3 roll-outs: mean"));
+    CHECK_FALSE(fs::exists(stage.folder / name / "plumb-calibrator.log"));
+    return nlohmann::json::parse(Read(summary));
+  };
+  const auto summary = play("first");
+  CHECK(Left(stage) == 0);
+  CHECK(summary.at("iterations").empty());
+  CHECK(summary.at("policy").is_null());
+  REQUIRE(summary.at("evaluation_returns").size() == 3);
+  CHECK_THAT(Read(report), Contains("of 3 roll-outs"));
+  CHECK(play("again").at("evaluation_returns") == summary.at("evaluation_returns"));
+
+  std::ofstream(policy) << "no policy";
+  Child refused = Launch(stage, {"--policy", policy}, "refused");
+  stage.WaitUntil([&] { return !refused.running(); }, kLong);
+  CHECK(refused.failed());
+  CHECK_THAT(refused.Tail(20),
+             Contains("trainer.checkpoint: is neither a trainer's checkpoint nor an ONNX model"));
+}
+
 TEST_CASE("the loop closes, and its log gives the same distributions bit by bit") {
   Stage stage(30, "pendulum", Stage::Time::kReal);
   LearnLittle(stage);

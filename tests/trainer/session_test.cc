@@ -4,7 +4,10 @@
 #include <cmath>
 #include <vector>
 
+#include "tests/temporary_folder.h"
 #include "tests/trainer/pendulum_session.h"
+#include "trainer/onnx_policy.h"
+#include "trainer/policy_file.h"
 
 namespace plumb {
 namespace {
@@ -253,6 +256,15 @@ TEST_CASE("a policy that is too large to be sent is refused before it is trained
                                                 Catch::Contains("4.2 MB") &&
                                                 Catch::Contains("4 MB"));
   CHECK_THROWS(TrainingSession(robot, MakeGymPendulum, 1, 1, 1));
+  const auto task = MakeTask(robot);
+  const TemporaryFolder folder;
+  const std::string file = folder / "large.onnx";
+  WriteOnnxPolicy(
+      file, {GaussianPolicy({task->observation_size(), robot.training.hidden, task->action_size()}),
+             MakePolicyRecord(robot, *task)});
+  CHECK_NOTHROW(LoadPolicy(file, robot, *task));
+  CHECK_THROWS_WITH(LoadSendablePolicy(file, robot),
+                    Catch::Contains("large.onnx") && Catch::Contains("4.2 MB"));
 }
 
 }  // namespace
