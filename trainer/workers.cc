@@ -40,11 +40,18 @@ Role RoleIn(const Workers* workers) { return role.workers == workers ? role : Ro
 
 Workers::Workers(int threads) : size_(ThreadCount(threads)) {
   for (Job& job : jobs_) job.claims = std::make_unique<Claims[]>(static_cast<size_t>(size_));
-  for (int worker = 1; worker < size_; ++worker)
-    threads_.emplace_back([this, worker] { Serve(worker); });
+  try {
+    for (int worker = 1; worker < size_; ++worker)
+      threads_.emplace_back([this, worker] { Serve(worker); });
+  } catch (...) {  // the system has no more threads
+    Stop();
+    throw;
+  }
 }
 
-Workers::~Workers() {
+Workers::~Workers() { Stop(); }
+
+void Workers::Stop() {
   stopping_ = true;
   Wake();
   for (std::thread& thread : threads_) thread.join();
@@ -114,8 +121,9 @@ void Workers::Serve(int worker) {
   sigfillset(&all);
   pthread_sigmask(SIG_BLOCK, &all, nullptr);
   role = {this, worker, 0};
-  while (!stopping_) {
-    const uint32_t seen = news_;
+  for (;;) {
+    const uint32_t seen = news_;  // before what the news may be of: whoever stops wakes once
+    if (stopping_) return;
     if (const auto* companion = companion_.exchange(nullptr)) (*companion)();
     if (!DoAny(worker) && news_ == seen) WaitWhile(news_, seen);
   }

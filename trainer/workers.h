@@ -56,6 +56,7 @@ class Workers {
   };
 
   void Serve(int worker);
+  void Stop();
   /// Claims a task and does it. @return false if there is none left.
   bool DoTask(Job& job, int worker);
   bool DoAny(int worker);
