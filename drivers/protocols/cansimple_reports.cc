@@ -51,6 +51,7 @@ FrameUse CanSimpleReports::OnFrame(const Frame& frame, int64_t now) noexcept {
   if (!layout) return FrameUse::kRejected;
   const auto values = DecodePayload(*layout, frame);
   if (!values) return FrameUse::kRejected;
+  if (layout->command == kGetTemperature.command) return OnTemperatures(*values, now);
   if (!AllFinite(*layout, *values)) {
     const bool estimates = layout->command == kGetEncoderEstimates.command;
     return estimates ? FrameUse::kNotFinite : FrameUse::kRejected;
@@ -65,11 +66,6 @@ FrameUse CanSimpleReports::OnFrame(const Frame& frame, int64_t now) noexcept {
       return OnEstimates(v, now);
     case kGetTorques.command:
       torque_estimate_ = v[1];
-      break;
-    case kGetTemperature.command:
-      readings_.drive_temperature = v[0];
-      readings_.motor_temperature = v[1];
-      readings_.temperatures_at = now;
       break;
     case kGetBusVoltageCurrent.command:
       readings_.bus_voltage = v[0];
@@ -86,6 +82,21 @@ FrameUse CanSimpleReports::OnVersion(const FieldValues& v) noexcept {
   firmware_ = {number(4), number(5)};
   identity_.Set("firmware {}.{}.{}{}, hardware {}.{}.{}", number(4), number(5), number(6),
                 number(7) != 0 ? " unreleased" : "", number(1), number(2), number(3));
+  return FrameUse::kConsumed;
+}
+
+// A motor without a thermistor has NaN (ODrive firmware 0.5, MotorControl/thermistor.hpp), and the
+// power stage's temperature counts all the same. What was a number, and no longer is, has broken.
+FrameUse CanSimpleReports::OnTemperatures(const FieldValues& v, int64_t now) noexcept {
+  const auto good = [](double next, double known) {
+    return std::isfinite(next) || (std::isnan(next) && std::isnan(known));
+  };
+  const bool none = std::isnan(v[0]) && std::isnan(v[1]);
+  if (none || !good(v[0], readings_.drive_temperature) || !good(v[1], readings_.motor_temperature))
+    return FrameUse::kRejected;
+  readings_.drive_temperature = v[0];
+  readings_.motor_temperature = v[1];
+  readings_.temperatures_at = now;
   return FrameUse::kConsumed;
 }
 

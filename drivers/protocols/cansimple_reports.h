@@ -52,6 +52,7 @@ class CanSimpleReports {
  private:
   FrameUse OnVersion(const FieldValues& values) noexcept;
   FrameUse OnAddress(const FieldValues& values) noexcept;
+  FrameUse OnTemperatures(const FieldValues& values, int64_t now) noexcept;
   FrameUse OnEstimates(const FieldValues& values, int64_t now) noexcept;
   void LookForRestart() noexcept;
 

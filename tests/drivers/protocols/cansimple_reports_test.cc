@@ -86,6 +86,20 @@ TEST_CASE("temperatures and supply are read, NaN until they have come") {
   CHECK(bench.motor->torque_estimate() == 1.4375);
 }
 
+TEST_CASE("a motor without a thermistor leaves its power stage's temperature known") {
+  Bench bench;
+  CHECK(bench.Use("035#0000C07F0000C07F") == FrameUse::kRejected);  // neither is a number
+  CHECK(bench.motor->readings().temperatures_at == 0);
+  CHECK(bench.Use("035#000026420000C07F") == FrameUse::kConsumed);
+  CHECK(bench.motor->readings().drive_temperature == 41.5);
+  CHECK(std::isnan(bench.motor->readings().motor_temperature));
+  CHECK(bench.Use("035#000026420000807F") == FrameUse::kRejected);  // infinite
+  CHECK(bench.Use("035#0000264200001142") == FrameUse::kConsumed);
+  CHECK(bench.motor->readings().motor_temperature == 36.25);
+  CHECK(bench.Use("035#000026420000C07F") == FrameUse::kRejected);  // it had one
+  CHECK(bench.motor->readings().motor_temperature == 36.25);
+}
+
 TEST_CASE("the drive says what it is when it is armed") {
   Bench bench;
   CHECK(bench.motor->identity().empty());
