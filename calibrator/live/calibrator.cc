@@ -27,14 +27,14 @@ int64_t Time(const SimOpt::State& state) {
 
 void Calibrator::OnCommand(const joint_command_t& command) {
   joiner_.OnCommand(command);
-  if (command.episode > newest_episode_) newest_episode_ = command.episode, next_step_ = 0;
+  if (command.episode >= 0) newest_episode_ = command.episode;
 }
 
 Rollout Calibrator::TakeArrived() {
   Rollout rollout;
   rollout.episode = newest_episode_;
   rollout.policy_iteration = simopt_.state().iteration;
-  if (rolling_out_) rollout.transitions = joiner_.Arrived(newest_episode_, &next_step_);
+  if (rolling_out_) rollout.transitions = joiner_.TakeArrived(newest_episode_);
   return rollout;
 }
 

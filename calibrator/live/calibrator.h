@@ -45,7 +45,6 @@ class Calibrator {
   std::optional<controller_status_t> complete_;
   bool rolling_out_ = false;
   int64_t newest_episode_ = -1;
-  int next_step_ = 0;  // of it, to be taken
 };
 
 /// SimOpt's distribution over the robot's simulators, as the iterations completed so far have it:

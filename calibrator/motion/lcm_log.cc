@@ -19,13 +19,8 @@ namespace {
 // [states] A message may be in the log that much later than one of another channel that came after
 // it.
 constexpr int64_t kPatience = 5000;
-// [states] The same within a channel, where messages keep their order but for a few: further back
-// is another run.
-constexpr int64_t kReordered = 1000;
 // Episodes under way at once: in a robot's log an episode has a state of its own at least.
 constexpr size_t kMostEpisodes = kPatience;
-// No counter gets there; beyond it, sums and differences overflow.
-constexpr int64_t kLargest = int64_t{1} << 53;
 
 /// Joins the episodes of a log one after the other as soon as each is complete, so that no more
 /// than one or two need be remembered however long the log is.
@@ -37,13 +32,9 @@ class EpisodeJoiner {
   void OnState(const robot_state_t& state) {
     if (!Fits(state.num_positions, robot_.num_positions(), "coordinates") ||
         !Fits(state.num_velocities, robot_.num_velocities(), "velocities") || state.sequence < 0 ||
-        state.sequence > kLargest || !IsTime(state.utime))
+        state.sequence > TransitionJoiner::kMaxSequence || !IsTime(state.utime))
       return;
-    const robot_state_t* newest = joiner_.FindState(joiner_.newest_state());
-    if (newest && (state.sequence < newest->sequence - kReordered ||
-                   (state.sequence <= newest->sequence && state.utime > newest->utime))) {
-      BeginRun();
-    }
+    if (joiner_.BeginsRun(state)) BeginRun();
     joiner_.OnState(state);
     while (!episodes_.empty() && IsComplete(episodes_.front())) JoinFirst();
     int64_t needed = joiner_.newest_state() - kPatience;
@@ -127,7 +118,8 @@ class EpisodeJoiner {
   // Whether a state is there, or may still come. Nothing is known of a log's first ones.
   bool MayCome(int64_t state) const {
     const int64_t newest = joiner_.newest_state();
-    return state >= 0 && state <= (newest < 0 ? kLargest : newest + kPatience);
+    return state >= 0 &&
+           state <= (newest < 0 ? TransitionJoiner::kMaxSequence : newest + kPatience);
   }
 
   // A restarted driver counts its states from 0 again. What is under way gets no further.

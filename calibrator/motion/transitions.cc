@@ -16,6 +16,8 @@ namespace {
 constexpr size_t kMaxEpisodes = 64;
 constexpr size_t kMaxCommands = 200'000;
 constexpr int kMaxSteps = 1'000'000;
+// [states] Within a channel messages keep their order but for a few: further back is another run.
+constexpr int64_t kReordered = 1000;
 
 Eigen::VectorXd ToEigen(const std::vector<double>& values) {
   return Eigen::VectorXd::Map(values.data(), static_cast<Eigen::Index>(values.size()));
@@ -107,19 +109,24 @@ const robot_state_t* TransitionJoiner::FindState(int64_t sequence) const {
   return found == states_.end() ? nullptr : &found->second;
 }
 
+// At a later time, or so far behind that no delay explains it: its clock may have been set back.
+bool TransitionJoiner::BeginsRun(const robot_state_t& smoothed) const {
+  if (states_.empty()) return false;
+  const auto& [newest, state] = *states_.rbegin();
+  return smoothed.sequence < newest - kReordered ||
+         (smoothed.sequence <= newest && smoothed.utime > state.utime);
+}
+
 void TransitionJoiner::OnState(const robot_state_t& smoothed) {
   if (smoothed.num_positions != space_.num_positions() ||
       smoothed.num_velocities != space_.num_velocities())
     return;
-  if (!IsTime(smoothed.utime)) return;
-  // A restarted driver counts from 0 again, at a later time; what was before cannot be joined with
-  // it.
-  if (!states_.empty() && smoothed.sequence <= newest_state() &&
-      smoothed.utime > states_.rbegin()->second.utime) {
+  if (smoothed.sequence < 0 || smoothed.sequence > kMaxSequence || !IsTime(smoothed.utime)) return;
+  if (BeginsRun(smoothed)) {  // what was before cannot be joined with it
     cut_off_.clear();
-    for (const auto& [episode, commands] : commands_) cut_off_.insert(episode);
+    for (const auto& [id, episode] : episodes_) cut_off_.insert(id);
     states_.clear();
-    commands_.clear();
+    episodes_.clear();
     num_commands_ = 0;
   }
   robot_state_t& state = states_.insert_or_assign(smoothed.sequence, smoothed).first->second;
@@ -133,59 +140,68 @@ void TransitionJoiner::OnCommand(const joint_command_t& command) {
   if (command.num_joints != num_joints_ || command.episode < 0 || command.step < 0 ||
       command.step >= kMaxSteps)
     return;
+  Episode& episode = episodes_.try_emplace(command.episode).first->second;
+  if (episode.answer.empty()) episode.number = num_episodes_++;
   const bool is_new =
-      commands_[command.episode]
+      episode.answer
           .insert_or_assign(command.step, Answer{command.state_sequence, command.policy_iteration})
           .second;
   if (is_new) ++num_commands_;
-  if (commands_.size() > max_episodes_) ForgetEpisode(commands_.begin());
+  if (episodes_.size() > max_episodes_) ForgetFirstEpisode();
   if (num_commands_ <= max_commands_) return;
-  if (commands_.size() > 1) return ForgetEpisode(commands_.begin());
-  commands_.begin()->second.erase(commands_.begin()->second.begin());
+  if (episodes_.size() > 1) return ForgetFirstEpisode();
+  episode.answer.erase(episode.answer.begin());
   --num_commands_;
 }
 
-void TransitionJoiner::ForgetEpisode(Commands::iterator episode) {
-  num_commands_ -= episode->second.size();
-  commands_.erase(episode);
+void TransitionJoiner::ForgetEpisode(Episodes::iterator episode) {
+  num_commands_ -= episode->second.answer.size();
+  episodes_.erase(episode);
+}
+
+// Not that of the least id: ids are times, which a clock that is set back begins anew.
+void TransitionJoiner::ForgetFirstEpisode() {
+  ForgetEpisode(std::ranges::min_element(
+      episodes_, {}, [](const auto& episode) { return episode.second.number; }));
 }
 
 Rollout TransitionJoiner::Join(int64_t episode, int64_t last_state) {
   Rollout rollout;
   rollout.episode = episode;
-  const auto found = commands_.find(episode);
-  if (found == commands_.end()) return rollout;
-  const std::map<int, Answer>& commands = found->second;
-  for (auto command = commands.begin(); command != commands.end(); ++command) {
-    rollout.policy_iteration = command->second.policy_iteration;
-    const auto next = std::next(command);
-    if (next != commands.end() && next->first != command->first + 1) {
+  const auto found = episodes_.find(episode);
+  if (found == episodes_.end()) return rollout;
+  const std::map<int, Answer>& answers = found->second.answer;
+  for (auto answer = answers.begin(); answer != answers.end(); ++answer) {
+    rollout.policy_iteration = answer->second.policy_iteration;
+    const auto next = std::next(answer);
+    if (next != answers.end() && next->first != answer->first + 1) {
       ++drops_.gap;
       continue;
     }
     Transition transition;
-    transition.step = command->first;
-    const int64_t to = next != commands.end() ? next->second.state_sequence : last_state;
-    if (JoinOne(command->second.state_sequence, to, &transition, &drops_))
+    transition.step = answer->first;
+    const int64_t to = next != answers.end() ? next->second.state_sequence : last_state;
+    if (JoinOne(answer->second.state_sequence, to, &transition, &drops_))
       rollout.transitions.push_back(std::move(transition));
   }
   ForgetEpisode(found);
   return rollout;
 }
 
-std::vector<Transition> TransitionJoiner::Arrived(int64_t episode, int* from) const {
+std::vector<Transition> TransitionJoiner::TakeArrived(int64_t episode) {
   std::vector<Transition> arrived;
-  const auto found = commands_.find(episode);
-  if (found == commands_.end()) return arrived;
+  const auto found = episodes_.find(episode);
+  if (found == episodes_.end()) return arrived;
   DropCounts uncounted;
-  for (auto command = found->second.lower_bound(*from); command != found->second.end(); ++command) {
-    const auto next = std::next(command);
-    if (next == found->second.end() || newest_state() < next->second.state_sequence) break;
-    *from = next->first;
+  auto& [number, next_taken, answers] = found->second;
+  for (auto answer = answers.lower_bound(next_taken); answer != answers.end(); ++answer) {
+    const auto next = std::next(answer);
+    if (next == answers.end() || newest_state() < next->second.state_sequence) break;
+    next_taken = next->first;
     Transition transition;
-    transition.step = command->first;
-    const bool follows = next->first == command->first + 1;
-    if (follows && JoinOne(command->second.state_sequence, next->second.state_sequence, &transition,
+    transition.step = answer->first;
+    const bool follows = next->first == answer->first + 1;
+    if (follows && JoinOne(answer->second.state_sequence, next->second.state_sequence, &transition,
                            &uncounted)) {
       arrived.push_back(std::move(transition));
     }

@@ -72,14 +72,21 @@ struct DropCounts {
 class TransitionJoiner {
  public:
   static constexpr size_t kMaxStates = 200'000;  ///< 400 s of a driver at 500 Hz
+  /// No driver counts so far; beyond it, sums and differences overflow.
+  static constexpr int64_t kMaxSequence = int64_t{1} << 53;
 
-  /// Memory is bounded: the oldest states, episodes and commands are forgotten, as a process that
-  /// runs for days must. At most kMaxStates states of 350 bytes and 40 a joint, and 200 000
-  /// commands of 64 bytes.
+  /// Memory is bounded: the oldest states, and the episodes and commands that came first, are
+  /// forgotten, as a process that runs for days must. At most kMaxStates states of 350 bytes and 40
+  /// a joint, and 200 000 commands of 64 bytes.
   explicit TransitionJoiner(const RobotDescription& robot);
   /// Nothing is forgotten but by Forget.
   static TransitionJoiner Unbounded(const RobotDescription& robot);
 
+  /// Whether a state is of a driver that has been started again since the newest one: it counts
+  /// from 0 again. States of one driver come in about their order.
+  bool BeginsRun(const robot_state_t& smoothed) const;
+
+  /// Ignores states of another robot's size, and sequences beyond kMaxSequence.
   void OnState(const robot_state_t& smoothed);
   void OnCommand(const joint_command_t& command);
 
@@ -100,11 +107,10 @@ class TransitionJoiner {
   /// @param last_state sequence of the state that ended it.
   Rollout Join(int64_t episode, int64_t last_state);
 
-  /// The transitions of an episode under way from step `*from` on that have been received whole,
-  /// their successor's command included: what Join will say of them, unless a message comes late.
-  /// Forgets and counts nothing.
-  /// @param from becomes the first step that has not been looked at.
-  std::vector<Transition> Arrived(int64_t episode, int* from) const;
+  /// The transitions of an episode under way that have been received whole since it was last asked
+  /// for, their successor's command included: what Join will say of them, unless a message comes
+  /// late. Forgets no message and counts nothing.
+  std::vector<Transition> TakeArrived(int64_t episode);
 
   /// Forgets the states before that sequence number.
   void Forget(int64_t sequence) { states_.erase(states_.begin(), states_.lower_bound(sequence)); }
@@ -120,15 +126,22 @@ class TransitionJoiner {
     int32_t policy_iteration;
   };
 
-  using Commands = std::map<int64_t, std::map<int, Answer>>;  // by episode, by step
-  void ForgetEpisode(Commands::iterator episode);
+  struct Episode {
+    int64_t number = 0;            // in the order of their first commands
+    int next_taken = 0;            // step that TakeArrived has not looked at
+    std::map<int, Answer> answer;  // by step
+  };
+  using Episodes = std::map<int64_t, Episode>;
+  void ForgetEpisode(Episodes::iterator episode);
+  void ForgetFirstEpisode();
 
   int num_joints_;
   ConfigurationSpace space_;
   double period_, greatest_effort_;
   size_t max_states_, max_episodes_, max_commands_;
   std::map<int64_t, robot_state_t> states_;  // by sequence
-  Commands commands_;
+  Episodes episodes_;
+  int64_t num_episodes_ = 0;  // ever
   size_t num_commands_ = 0;
   std::set<int64_t> cut_off_;  // episodes that the driver's last restart has taken
   DropCounts drops_;

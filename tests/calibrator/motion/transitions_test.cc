@@ -316,6 +316,50 @@ TEST_CASE_METHOD(Fixture,
   CHECK(joiner.Join(42, 300).transitions.size() == 20);
 }
 
+TEST_CASE_METHOD(Fixture, "the episodes that came first are forgotten, whatever their ids") {
+  for (int64_t earlier = 0; earlier < 100; ++earlier) {  // of before the clock was set back
+    joint_command_t command = Command(0);
+    command.episode = 1'000'000 + earlier;
+    joiner.OnCommand(command);
+  }
+  States();
+  Commands();
+  CHECK(joiner.Join(42, 300).transitions.size() == 20);
+}
+
+TEST_CASE_METHOD(Fixture, "a driver that is started anew while its clock is set back counts anew") {
+  States(5000, 5010);
+  CHECK_FALSE(joiner.BeginsRun(State(4990)));  // it was late
+  CHECK(joiner.BeginsRun(State(90)));
+  States();
+  CHECK(joiner.newest_state() == 310);
+  Commands();
+  CHECK(joiner.Join(42, 300).transitions.size() == 20);
+}
+
+TEST_CASE_METHOD(Fixture, "a state that no driver can have counted to is not there") {
+  for (const int64_t sequence : {INT64_MAX, TransitionJoiner::kMaxSequence + 1, int64_t{-1}}) {
+    robot_state_t forged = State(200);
+    forged.sequence = sequence;
+    joiner.OnState(forged);
+  }
+  CHECK(joiner.newest_state() == -1);
+}
+
+TEST_CASE_METHOD(Fixture, "each transition of an episode under way is taken once") {
+  States();
+  for (int i = 0; i < 10; ++i) joiner.OnCommand(Command(i));
+  CHECK(joiner.TakeArrived(42).size() == 9);
+  CHECK(joiner.TakeArrived(42).empty());
+  joint_command_t forged = Command(0);
+  forged.episode = INT64_MAX;
+  joiner.OnCommand(forged);
+  CHECK(joiner.TakeArrived(forged.episode).empty());
+  for (int i = 10; i < 20; ++i) joiner.OnCommand(Command(i));
+  CHECK(joiner.TakeArrived(42).size() == 10);
+  CHECK(joiner.Join(42, 300).transitions.size() == 20);
+}
+
 TEST_CASE_METHOD(Fixture, "one state that is not physical takes its own transition, and no other") {
   const std::pair<std::vector<double> robot_state_t::*, double> forgeries[] = {
       {&robot_state_t::effort, 1e150}, {&robot_state_t::effort, -21 * robot.joints[0].effort_limit},
