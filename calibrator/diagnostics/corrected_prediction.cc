@@ -1,8 +1,6 @@
 #include "calibrator/diagnostics/corrected_prediction.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <optional>
 
 #include "calibrator/fit/recorded_window.h"
@@ -22,18 +20,6 @@ std::shared_ptr<const Residual> MeanOf(const Residual& residual) {
     function->unknown.setZero();
   }
   return mean;
-}
-
-// Mean over the entries that were observed, in standard units.
-double SquaredError(const ConfigurationSpace& space, const Simulator::State& reading,
-                    const Transition& t, const Eigen::VectorXd& scale) {
-  Eigen::ArrayXd error(scale.size()), recorded(scale.size());
-  recorded << space.Difference(t.next_q, t.next_q), t.next_v;
-  error << space.Difference(reading.q, t.next_q), reading.v - t.next_v;
-  const auto observed = recorded.isFinite();
-  const double mean = observed.select((error / scale.array()).square(), 0.0).sum() /
-                      static_cast<double>(observed.count());
-  return std::isfinite(mean) ? mean : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace
@@ -69,9 +55,10 @@ Eigen::VectorXd CorrectedPredictionErrors(const std::shared_ptr<const Model>& mo
         const auto* horizon = std::find(horizons.data(), horizons.data() + horizons.size(),
                                         static_cast<int>(i - start + 1));
         if (horizon == horizons.data() + horizons.size()) continue;
-        if (!t.next_q.array().isFinite().any() && !t.next_v.array().isFinite().any()) continue;
+        if (!IsObserved(t)) continue;
+        const Simulator::State reading = simulator.Reading();
         squares[horizon - horizons.data()] +=
-            SquaredError(model->space(), simulator.Reading(), t, scale);
+            MeanSquaredError(model->space(), reading.q, reading.v, t, scale);
         ++windows[horizon - horizons.data()];
       }
     }

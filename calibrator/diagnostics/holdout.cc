@@ -21,9 +21,7 @@ int64_t CountWindows(std::span<const Rollout> rollouts, int horizon) {
   int64_t count = 0;
   const auto length = static_cast<size_t>(horizon);
   for (const Rollout& rollout : rollouts) {
-    const auto& t = rollout.transitions;
-    for (size_t i = 0; i + length <= t.size(); ++i)
-      count += t[i + length - 1].step == t[i].step + horizon - 1;
+    for (size_t i = 0; i < rollout.transitions.size(); ++i) count += IsJudged(rollout, i, length);
   }
   return count;
 }

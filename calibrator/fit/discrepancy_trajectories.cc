@@ -158,31 +158,19 @@ Eigen::VectorXd Discrepancy::PredictionErrorHere(const Eigen::MatrixXd& paramete
   Ends ends;
   const auto length = static_cast<size_t>(horizon);
   for (const Rollout& rollout : rollouts) {
-    const auto& t = rollout.transitions;
-    for (size_t start = 0; start + length <= t.size(); ++start) {
-      if (t[start + length - 1].step != t[start].step + horizon - 1) continue;
-      if (!t[start + length - 1].next_q.array().isFinite().any() &&
-          !t[start + length - 1].next_v.array().isFinite().any())
-        continue;
+    for (size_t start = 0; start < rollout.transitions.size(); ++start) {
+      if (!IsJudged(rollout, start, length)) continue;
       windows.push_back(RecordedWindow(windows_.model(), rollout, start, length));
-      ends.push_back(&t[start + length - 1]);
+      ends.push_back(&rollout.transitions[start + length - 1]);
     }
   }
   if (windows.empty()) return Eigen::VectorXd::Constant(parameters.cols(), kNaN);
   Eigen::MatrixXd squared(static_cast<Eigen::Index>(windows.size()), parameters.cols());
-  Predict(
-      parameters, windows,
-      [&](Eigen::Index sample, size_t window, size_t, const auto& q, const auto& v) {
-        const Transition& end = *ends[window];
-        Eigen::VectorXd error(2 * n_);
-        error << space_.Difference(q, end.next_q), v - end.next_v;
-        Eigen::ArrayXd recorded(2 * n_);  // NaN where it is not
-        recorded << space_.Difference(end.next_q, end.next_q), end.next_v;
-        const auto observed = recorded.isFinite();
-        const double mean = observed.select((error.array() / scale_.array()).square(), 0.0).sum() /
-                            static_cast<double>(observed.count());
-        squared(static_cast<Eigen::Index>(window), sample) = std::isfinite(mean) ? mean : kInfinity;
-      });
+  Predict(parameters, windows,
+          [&](Eigen::Index sample, size_t window, size_t, const auto& q, const auto& v) {
+            squared(static_cast<Eigen::Index>(window), sample) =
+                MeanSquaredError(space_, q, v, *ends[window], scale_);
+          });
   return (ColumnSums(squared) / static_cast<double>(squared.rows())).cwiseSqrt();
 }
 

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "common/special_numbers.h"
+
 namespace plumb {
 
 size_t StretchLength(const Rollout& rollout, size_t first) {
@@ -12,6 +14,17 @@ size_t StretchLength(const Rollout& rollout, size_t first) {
          !disturbed(end))
     ++end;
   return end - first;
+}
+
+bool IsObserved(const Transition& t) {
+  return t.next_q.array().isFinite().any() || t.next_v.array().isFinite().any();
+}
+
+bool IsJudged(const Rollout& rollout, size_t first, size_t length) {
+  const auto& t = rollout.transitions;
+  const size_t last = first + length - 1;
+  return last < t.size() && t[last].step == t[first].step + static_cast<int>(length) - 1 &&
+         IsObserved(t[last]);
 }
 
 bool IsUnread(const Transition& t, Eigen::Index c) {
@@ -66,6 +79,18 @@ const Eigen::VectorXd& NearEnd(const Transition& t) {
 bool IsObserved(const ConfigurationSpace& space, const Transition& t, Eigen::Index c) {
   const Eigen::Index n = t.next_v.size();
   return std::isfinite(c < n ? space.Difference(t.next_q, t.next_q, c) : t.next_v(c - n));
+}
+
+double MeanSquaredError(const ConfigurationSpace& space, const Eigen::Ref<const Eigen::VectorXd>& q,
+                        const Eigen::Ref<const Eigen::VectorXd>& v, const Transition& t,
+                        const Eigen::VectorXd& scale) {
+  Eigen::ArrayXd error(scale.size()), recorded(scale.size());  // NaN where it is not
+  error << space.Difference(q, t.next_q), v - t.next_v;
+  recorded << space.Difference(t.next_q, t.next_q), t.next_v;
+  const auto observed = recorded.isFinite();
+  const double mean = observed.select((error / scale.array()).square(), 0.0).sum() /
+                      static_cast<double>(observed.count());
+  return std::isfinite(mean) ? mean : kInfinity;
 }
 
 void MoveStart(const ConfigurationSpace& space, Eigen::Index c, double by, Window* window) {

@@ -19,6 +19,13 @@ namespace plumb {
 /// What has disturbed one of them is not simulated: it is a stretch of its own.
 size_t StretchLength(const Rollout& rollout, size_t first);
 
+/// Whether something of a transition's end was observed.
+bool IsObserved(const Transition& transition);
+
+/// Whether `length` transitions from `first` on follow each other, to an end of which something was
+/// observed: predictions over that horizon are judged by it.
+bool IsJudged(const Rollout& rollout, size_t first, size_t length);
+
 /// The fewest control steps from which errors tell something of the simulator: one where states are
 /// read in full. Where nobody has read a velocity (ForgetVelocities), a window begins with one that
 /// its own positions have to tell, and only what they tell besides is about the simulator.
@@ -46,6 +53,11 @@ double EndSd(const Transition& transition, Eigen::Index c);
 const Eigen::VectorXd& NearEnd(const Transition& transition);
 /// Whether that entry was observed at all: of a quaternion all or nothing.
 bool IsObserved(const ConfigurationSpace& space, const Transition& transition, Eigen::Index c);
+/// Mean of the squared errors of (q, v) over the entries that were observed at a transition's end,
+/// in units of `scale`, 2 n of them; infinite where the prediction is not finite.
+double MeanSquaredError(const ConfigurationSpace& space, const Eigen::Ref<const Eigen::VectorXd>& q,
+                        const Eigen::Ref<const Eigen::VectorXd>& v, const Transition& transition,
+                        const Eigen::VectorXd& scale);
 /// The state with which a window begins, moved by so much in entry c.
 void MoveStart(const ConfigurationSpace& space, Eigen::Index c, double by, Window* window);
 
