@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "robot/contact_points.h"
+#include "robot/kinematics.h"
 
 namespace plumb {
 namespace {
@@ -14,15 +15,6 @@ namespace {
 using Type = JointDescription::Type;
 
 constexpr double kParallel = 1e-9;
-
-// Joints from the world to a link.
-std::vector<int> ChainTo(const RobotDescription& robot, int link) {
-  std::vector<int> chain;
-  for (int at = link; at != 0; at = robot.joints[static_cast<size_t>(chain.back())].parent)
-    chain.push_back(at - 1);
-  std::reverse(chain.begin(), chain.end());
-  return chain;
-}
 
 bool AtRightAngles(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::abs(a.dot(b)) < kParallel;

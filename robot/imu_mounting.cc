@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "robot/kinematics.h"
 #include "robot/twist_angle.h"
 
 namespace plumb {
@@ -11,11 +12,7 @@ namespace plumb {
 ImuMounting MountingOf(const RobotDescription& robot, int link) {
   using Type = JointDescription::Type;
   ImuMounting mounting;
-  std::vector<int> chain;  // from the link down to the base
-  for (int at = link; at != 0; at = robot.joints[static_cast<size_t>(chain.back())].parent)
-    chain.push_back(at - 1);
-  std::reverse(chain.begin(), chain.end());
-
+  const std::vector<int> chain = ChainTo(robot, link);
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  // of the joint's axes, in the base's
   for (const int index : chain) {
     const JointDescription& joint = robot.joints[static_cast<size_t>(index)];

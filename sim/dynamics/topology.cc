@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
 #include "robot/contact_pairs.h"
 #include "robot/contact_points.h"
+#include "robot/kinematics.h"
 #include "sim/dynamics/narrow_phase.h"
 
 namespace plumb {
@@ -64,17 +64,6 @@ Matrix3d PlaneAxes(const Vector3d& normal) {
   Matrix3d axes;
   axes << y.cross(normal).transpose(), y.transpose(), normal.transpose();
   return axes;
-}
-
-void RequireTree(const RobotDescription& robot) {
-  for (size_t i = 0; i < robot.joints.size(); ++i) {
-    const JointDescription& joint = robot.joints[i];
-    if (joint.child != static_cast<int>(i) + 1 || joint.parent < 0 ||
-        joint.parent > static_cast<int>(i)) {
-      throw std::invalid_argument("joint '" + joint.name +
-                                  "' is not in depth-first order of a tree");
-    }
-  }
 }
 
 }  // namespace

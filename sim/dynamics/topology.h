@@ -76,7 +76,7 @@ struct Topology {
     return joint.velocity + (joint.type == JointDescription::Type::kSpherical ? 2 : 0);
   }
 
-  /// @throws std::invalid_argument unless joint i moves link i + 1 and hangs on a link before it.
+  /// @throws std::invalid_argument as RequireTree.
   explicit Topology(const RobotDescription& description);
 
  private:

@@ -1,6 +1,6 @@
 #include "sim/virtual/simbody_tree.h"
 
-#include <stdexcept>
+#include "robot/kinematics.h"
 
 namespace plumb {
 namespace {
@@ -48,13 +48,9 @@ SimbodyTree::SimbodyTree(const RobotDescription& robot)
           ToSimbody(Eigen::Vector3d(robot.simulation.gravity * robot.virtual_robot.ground.Down()))),
       efforts(forces, matter),
       links{matter.Ground()} {
+  RequireTree(robot);
   for (size_t i = 0; i < robot.joints.size(); ++i) {
     const JointDescription& joint = robot.joints[i];
-    if (joint.child != static_cast<int>(i) + 1 || joint.parent < 0 ||
-        joint.parent > static_cast<int>(i)) {
-      throw std::invalid_argument("joint '" + joint.name +
-                                  "' is not in depth-first order of a tree");
-    }
     const SimTK::Body::Rigid body(ToSimbody(robot.links[i + 1]));
     links.push_back(Attach(joint, links[static_cast<size_t>(joint.parent)], body));
   }
