@@ -41,7 +41,7 @@ void AgreementWatch::Judge() {
   else if (!rate_moved_)
     finding_ = Finding::kRateStuck;
   else if (std::abs(largest_step_) > 0.8 * std::abs(excess))
-    finding_ = Finding::kLevelJumped;
+    finding_ = Finding::kLevelJumped, excess_ = largest_step_;
   else
     finding_ = Finding::kDisagree;
   // The next window begins where this one ends.

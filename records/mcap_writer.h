@@ -24,7 +24,7 @@ class McapWriter {
   /// @param encoding "jsonschema". @return its number, > 0.
   uint16_t AddSchema(std::string_view name, std::string_view encoding, std::string_view data);
   /// @param encoding of its messages, "json". @return its number. @throws std::length_error after
-  /// 65535 of them.
+  /// 65536 of them.
   uint16_t AddChannel(std::string_view topic, uint16_t schema, std::string_view encoding);
   /// What people may want to know. @param name of the entries.
   void AddMetadata(std::string_view name, const std::map<std::string, std::string>& entries);

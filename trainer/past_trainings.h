@@ -24,7 +24,8 @@ class PastTrainings {
   PastTrainings(std::filesystem::path folder, uint64_t run)
       : folder_(std::move(folder)), run_(run) {}
 
-  /// The session has begun an iteration. @throws CheckpointError if a file is damaged.
+  /// The session has begun an iteration. Of a file that is damaged it warns, and the iteration is
+  /// trained again.
   void Begin(const TrainingSession& session);
   /// Updates that are known have not been repeated yet: the session stands at the beginning.
   bool repeating() const { return past_.has_value(); }

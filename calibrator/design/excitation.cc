@@ -102,7 +102,7 @@ class Rater {
     const Eigen::Index n = robot_.num_velocities(), steps = action.rows();
     const double period = robot_.task.period,
                  latency = std::clamp(robot_.simulation.latency, 0.0, period);
-    Motion motion{{}, Margin(robot_, q_, v_), Eigen::MatrixXd(n, steps + 1)};
+    Motion motion{{}, Margin(robot_, q_, v_), Eigen::MatrixXd(robot_.num_positions(), steps + 1)};
     simulator_.SetParameters(robot_.ToPhysical(coordinates));
     simulator_.SetState(q_, v_);
     motion.q.col(0) = q_;

@@ -29,8 +29,8 @@ struct ImportanceFit {
 /// A density known up to its constant, from guesses of its modes: population Monte Carlo with a
 /// mixture of Gaussians as proposal (Cappe et al., Statistics and Computing 18, 2008, eq. 11-13),
 /// its samples weighted by the deterministic mixture of all rounds' proposals (Cornuet et al.,
-/// Scand. J. Stat. 39, 2012: AMIS). The proposals have twice the components' variance for half of
-/// the draws, so that tails are seen, too; the first trusts the guess's weights by half only. A
+/// Scand. J. Stat. 39, 2012: AMIS). The proposals have four times the components' variance for half
+/// of the draws, so that tails are seen, too; the first trusts the guess's weights by half only. A
 /// component with fewer than n + 1 effective samples keeps its covariance.
 /// Where fewer than kLeastEss (n + 1) samples count, weights are raised to the power, below one,
 /// that makes so many count (Koblents and Miguez, Statistics and Computing 25, 2015): proposals

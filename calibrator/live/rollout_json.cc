@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calibrator/live/json_values.h"
+#include "common/special_numbers.h"
 #include "robot/configuration_space.h"
 #include "robot/physical.h"
 
@@ -74,9 +75,11 @@ void RequireTransitions(const Rollout& rollout, const RobotDescription& robot) {
       if (const std::string fault = space.Fault(*q); !fault.empty())
         throw std::runtime_error("a transition's q " + fault);
     }
+    if (t.efforts.empty()) throw std::runtime_error("a transition has no efforts");
     for (const EffortSegment& segment : t.efforts) {
       require(segment.effort, velocities, IsPhysical);
-      if (!(segment.duration > 0)) throw std::runtime_error("an effort lasts no time");
+      if (!(segment.duration > 0 && segment.duration < kInfinity))
+        throw std::runtime_error("an effort lasts no time");
     }
   }
 }

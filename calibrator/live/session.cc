@@ -27,7 +27,8 @@ CalibrationSession::CalibrationSession(const RobotDescription& robot, const Sett
               settings.method.empty() ? robot.calibration.method : settings.method),
       calibrator_(robot, simopt_),
       checkpoint_(settings.folder, robot, settings.seed) {
-  if (auto state = checkpoint_.Load(); state && !settings.anew) Resume(std::move(*state));
+  if (settings.anew) return;
+  if (auto state = checkpoint_.Load()) Resume(std::move(*state));
 }
 
 void CalibrationSession::Resume(SimOpt::State state) {

@@ -178,12 +178,13 @@ void SimOpt::Infer() {
   try {
     const GapFit fit = RunFromWhereItIs();
     const MethodResult& result = fit.result;
+    const double kl = KlDivergence(Moments(result.posterior), Moments(state_.before));
     state_.residual = fit.gap.residual, state_.informed = fit.gap.informed;
     state_.explained = fit.explained;
     state_.information = fit.information;
     state_.alarm = fit.alarm.alarm ? fit.alarm.summary : "";
     state_.gap = fit.alarm.judged ? fit.gap.summary : fit.alarm.summary;
-    state_.kl = KlDivergence(Moments(result.posterior), Moments(state_.before));
+    state_.kl = kl;
     state_.ess = result.ess;
     state_.temperature = 1;
     state_.distribution = result.posterior;

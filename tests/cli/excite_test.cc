@@ -52,6 +52,16 @@ TEST_CASE(
   CHECK(Read(folder / "a.csv") != Read(folder / "b.csv"));
 }
 
+TEST_CASE("excite: a robot whose base floats, which has more coordinates than velocities") {
+  const TemporaryFolder folder;
+  const Outcome outcome =
+      Excite("quadruped", "--candidates 1 --seconds 0.2 --output " + (folder / "a.csv") +
+                              " --png " + (folder / "a.png"));
+  INFO(outcome.text);
+  CHECK(outcome.status == 0);
+  CHECK(Read(folder / "a.png").rfind("\x89PNG", 0) == 0);
+}
+
 TEST_CASE("a program that was started to outlive its terminal does") {
   // as nohup starts it; it is hung up on before it can look
   const Outcome outcome =

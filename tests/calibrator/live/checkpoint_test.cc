@@ -45,6 +45,10 @@ TEST_CASE("no bit of a checkpoint can be changed unnoticed, nor a size be wrong"
   state.rollouts[0].transitions[0].v_sd.setConstant(1, 1e-160);
   CalibrationCheckpoint(folder.path(), robot, 1).Save(state);
   CHECK_THROWS_WITH(load(), Catch::Contains("not physical"));
+  state.rollouts[0].transitions[0].v_sd.setConstant(1, 0.25);
+  state.rollouts[0].transitions[0].efforts.clear();
+  CalibrationCheckpoint(folder.path(), robot, 1).Save(state);
+  CHECK_THROWS_WITH(load(), Catch::Contains("no efforts"));
 }
 
 }  // namespace
