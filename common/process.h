@@ -105,7 +105,7 @@ class Process {
   std::vector<pollfd> polled_;  // keeps its memory from call to call
 };
 
-/// "plumb-driver 0.1.0 (3f2a9c1, clean)"
+/// "plumb-driver 1.0.0 (3f2a9c1, clean)"
 std::string VersionLine(const std::string& name);
 
 /// Parses the flags (the common ones and `add_flags`), starts the log, blocks the stop signals,

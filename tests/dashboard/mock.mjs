@@ -12,7 +12,7 @@ const BEGIN = 1_700_000_000_000_000;
 
 const PARAMETERS = [["gravity", "m/s^2", 10.4, 0.57, 10.418], ["mass/pole", "kg", 1.04, 0.18, 1.078], ["length/pole", "m", 1.04, 0.18, 1.1027], ["friction/pivot", "Nm", 0.05, 0.03, 0.077]];
 const ROBOT = {
-  name: "pendulum", version: "0.1.0", joints: [{ name: "pivot", type: "continuous", unit_position: "rad", unit_velocity: "rad/s", unit_effort: "Nm", lower: null, upper: null, effort: 2, velocity: 8 }],
+  name: "pendulum", version: "1.0.0", joints: [{ name: "pivot", type: "continuous", unit_position: "rad", unit_velocity: "rad/s", unit_effort: "Nm", lower: null, upper: null, effort: 2, velocity: 8 }],
   coordinates: [{ name: "pivot", unit: "rad" }], velocities: [{ name: "pivot", unit: "rad/s" }],
   parameters: PARAMETERS.map(([name, unit, prior_mean, prior_sd]) => ({ name, unit, prior_mean, prior_sd })), task: { name: "pendulum", period: 0.02, steps: 200 }, channels: [], may_control: true, why_not: "",
 };
