@@ -79,7 +79,7 @@ void RequireTransitions(const Rollout& rollout, const RobotDescription& robot) {
     for (const EffortSegment& segment : t.efforts) {
       require(segment.effort, velocities, IsPhysical);
       if (!(segment.duration > 0 && segment.duration < kInfinity))
-        throw std::runtime_error("an effort lasts no time");
+        throw std::runtime_error("an effort lasts no time, or for ever");
     }
   }
 }
