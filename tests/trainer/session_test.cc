@@ -256,12 +256,13 @@ TEST_CASE("a policy that is too large to be sent is refused before it is trained
                                                 Catch::Contains("4.2 MB") &&
                                                 Catch::Contains("4 MB"));
   CHECK_THROWS(TrainingSession(robot, MakeGymPendulum, 1, 1, 1));
+  robot.task.period = 0.05;
   const auto task = MakeTask(robot);
+  GaussianPolicy policy({task->observation_size(), robot.training.hidden, task->action_size()});
+  policy.action_scale = robot.effort_limits().cast<float>();
   const TemporaryFolder folder;
   const std::string file = folder / "large.onnx";
-  WriteOnnxPolicy(
-      file, {GaussianPolicy({task->observation_size(), robot.training.hidden, task->action_size()}),
-             MakePolicyRecord(robot, *task)});
+  WriteOnnxPolicy(file, {policy, MakePolicyRecord(robot, *task)});
   CHECK_NOTHROW(LoadPolicy(file, robot, *task));
   CHECK_THROWS_WITH(LoadSendablePolicy(file, robot),
                     Catch::Contains("large.onnx") && Catch::Contains("4.2 MB"));
