@@ -20,7 +20,7 @@ RobotDescription LimitedPendulum() {
 }
 
 // A swing within the limits, its numbers in other units.
-std::string Swinging(double position, double velocity, double action, double time = 1) {
+std::string SwingingTable(double position, double velocity, double action, double time = 1) {
   std::string csv = "t,q/pivot,v/pivot,u/pivot\n";
   for (int k = 0; k < 100; ++k) {
     const double phase = 0.3 * k;
@@ -31,13 +31,13 @@ std::string Swinging(double position, double velocity, double action, double tim
 }
 
 TEST_CASE("a table in the robot's units is asked nothing, nor one a little beyond the limits") {
-  CHECK(ReadTable(Swinging(1, 1, 1), LimitedPendulum()).warnings.empty());
-  CHECK(ReadTable(Swinging(2, 3, 1), LimitedPendulum()).warnings.empty());
-  CHECK(ReadTable(Swinging(kDegrees, 1, 1)).warnings.empty());  // it has no limits
+  CHECK(ReadTable(SwingingTable(1, 1, 1), LimitedPendulum()).warnings.empty());
+  CHECK(ReadTable(SwingingTable(2, 3, 1), LimitedPendulum()).warnings.empty());
+  CHECK(ReadTable(SwingingTable(kDegrees, 1, 1)).warnings.empty());  // it has no limits
 }
 
 TEST_CASE("angles and speeds in degrees are asked about") {
-  const auto warnings = ReadTable(Swinging(kDegrees, kDegrees, 1), LimitedPendulum()).warnings;
+  const auto warnings = ReadTable(SwingingTable(kDegrees, kDegrees, 1), LimitedPendulum()).warnings;
   REQUIRE(warnings.size() == 2);
   CHECK_THAT(warnings[0], Catch::StartsWith("far beyond the joint's limits: q/pivot in 9") &&
                               Catch::EndsWith(" % of the rows: degrees?"));
@@ -59,7 +59,7 @@ TEST_CASE("a slide is asked about millimetres") {
 }
 
 TEST_CASE("actions that are nearly all clipped are asked about, joint by joint") {
-  const auto warnings = ReadTable(Swinging(1, 1, 1000), LimitedPendulum()).warnings;
+  const auto warnings = ReadTable(SwingingTable(1, 1, 1000), LimitedPendulum()).warnings;
   REQUIRE(warnings.size() == 2);
   CHECK(warnings[0].find(" actions go beyond the effort limits: clipped") != std::string::npos);
   CHECK_THAT(warnings[1], Catch::StartsWith("u/pivot: ") &&
@@ -91,10 +91,10 @@ TEST_CASE("a motor that idles, and is many times beyond its limit where it does 
 }
 
 TEST_CASE("rows a thousand control periods apart are asked about milliseconds") {
-  CHECK_THAT(Refusal(Swinging(1, 1, 1, 1e3)),
+  CHECK_THAT(Refusal(SwingingTable(1, 1, 1, 1e3)),
              Catch::EndsWith("the task's control period is 0.05 s: is t in milliseconds?"));
-  CHECK_THAT(Refusal(Swinging(1, 1, 1, 1e6)), Catch::EndsWith(": is t in microseconds?"));
-  CHECK_THAT(Refusal(Swinging(1, 1, 1, 7)), Catch::EndsWith("control period is 0.05 s"));
+  CHECK_THAT(Refusal(SwingingTable(1, 1, 1, 1e6)), Catch::EndsWith(": is t in microseconds?"));
+  CHECK_THAT(Refusal(SwingingTable(1, 1, 1, 7)), Catch::EndsWith("control period is 0.05 s"));
 }
 
 }  // namespace
