@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "robot/contact_points.h"
-#include "robot/kinematics.h"
+#include "robot/joint_tree.h"
 
 namespace plumb {
 namespace {

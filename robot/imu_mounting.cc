@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "robot/kinematics.h"
+#include "robot/joint_tree.h"
 #include "robot/twist_angle.h"
 
 namespace plumb {

@@ -26,13 +26,6 @@ struct LinkMotion : Pose {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< [m/s] of the link's origin
 };
 
-/// @throws std::invalid_argument unless joint i moves link i + 1 and hangs on a link before it.
-/// Thread-safe.
-void RequireTree(const RobotDescription& robot);
-
-/// Joints on the way from the base to a link (0 = the base), in this order. Thread-safe.
-std::vector<int> ChainTo(const RobotDescription& robot, int link);
-
 /// Positions, velocities and Jacobians of points on a robot's links. Does not allocate after
 /// construction. Not thread-safe.
 class Kinematics {

@@ -7,7 +7,7 @@
 
 #include "robot/contact_pairs.h"
 #include "robot/contact_points.h"
-#include "robot/kinematics.h"
+#include "robot/joint_tree.h"
 #include "sim/dynamics/narrow_phase.h"
 
 namespace plumb {

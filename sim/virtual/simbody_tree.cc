@@ -1,6 +1,6 @@
 #include "sim/virtual/simbody_tree.h"
 
-#include "robot/kinematics.h"
+#include "robot/joint_tree.h"
 
 namespace plumb {
 namespace {
