@@ -10,6 +10,7 @@
 #include "cli/replay.h"
 #include "cli/request.h"
 #include "cli/tune.h"
+#include "common/not_empty.h"
 #include "common/realtime.h"
 #include "common/seed_range.h"
 #include "common/signature.h"
@@ -159,10 +160,12 @@ void AddLoopFlags(CLI::App& launch, LaunchFlags& flags) {
       launch
           .add_option("--efforts", flags.efforts,
                       "instead of the loop: play this table of `plumb excite` once, calibrate")
+          ->check(NotEmpty())
           ->excludes(iterations, episodes);
   launch
       .add_option("--policy", flags.policy,
                   "instead of the loop: run this policy, an ONNX model or a trainer's checkpoint")
+      ->check(NotEmpty())
       ->excludes(iterations, efforts);
 }
 

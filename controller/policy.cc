@@ -15,7 +15,7 @@ namespace {
 constexpr int kMaxLayers = 10;
 constexpr int kMaxWidth = 4096;
 constexpr int64_t kMaxParameters = 1 << 24;
-constexpr int kMaxEpisodes = 1'000'000;
+constexpr int kMaxEpisodes = 10'000;  // each CONTROLLER_STATUS lists all: 45 bytes each
 
 [[noreturn]] void Reject(const std::string& what) {
   throw std::invalid_argument("policy: " + what);

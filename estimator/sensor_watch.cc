@@ -34,6 +34,7 @@ void AgreementWatch::Judge() {
   const double allowed = noise + s_.rate_bias * time_ + s_.rate_lag * std::abs(rate_ - first_rate_);
   duration_ = time_;
   excess_ = excess;
+  jump_ = largest_step_;
   if (std::abs(excess) <= allowed)
     finding_ = Finding::kNone;
   else if (!level_moved_)
@@ -41,7 +42,7 @@ void AgreementWatch::Judge() {
   else if (!rate_moved_)
     finding_ = Finding::kRateStuck;
   else if (std::abs(largest_step_) > 0.8 * std::abs(excess))
-    finding_ = Finding::kLevelJumped, excess_ = largest_step_;
+    finding_ = Finding::kLevelJumped;
   else
     finding_ = Finding::kDisagree;
   // The next window begins where this one ends.

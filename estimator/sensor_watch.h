@@ -56,8 +56,9 @@ class AgreementWatch {
 
   /// Of the last complete window.
   Finding finding() const { return finding_; }
-  /// change of the level less the rate's integral, or its part in the jump
+  /// change of the level less the rate's integral, and the largest part of it at one reading
   double excess() const { return excess_; }
+  double jump() const { return jump_; }
   double duration() const { return duration_; }  ///< [s]
   double level() const { return level_; }        ///< the newest
 
@@ -70,7 +71,7 @@ class AgreementWatch {
   double time_ = 0, integral_ = 0, variance_ = 0, largest_step_ = 0;
   bool level_moved_ = false, rate_moved_ = false;
   Finding finding_ = Finding::kNone;
-  double excess_ = 0, duration_ = 0;
+  double excess_ = 0, jump_ = 0, duration_ = 0;
 };
 
 }  // namespace plumb

@@ -25,7 +25,7 @@ std::string OfVelocity(const AgreementWatch& watch, Finding found, const char* r
     case Finding::kRateStuck:
       return fmt::format("{} stuck, but the position moves", rate);
     case Finding::kLevelJumped:
-      return fmt::format("position jumped by {:.3g}", watch.excess());
+      return fmt::format("position jumped by {:.3g}", watch.jump());
     case Finding::kDisagree:
       return fmt::format("position and {} disagree: by {:.3g}/s", rate,
                          watch.excess() / watch.duration());

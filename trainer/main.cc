@@ -10,6 +10,7 @@
 #include "common/examples.h"
 #include "common/hash.h"
 #include "common/name_lock.h"
+#include "common/not_empty.h"
 #include "common/process.h"
 #include "common/seed_range.h"
 #include "common/time_units.h"
@@ -217,6 +218,33 @@ class TrainerProcess {
   int missed_ = -1;  // policy whose trial was not there when it was needed
 };
 
+/// Tells once what a controller makes of a policy that is sent to it again and again.
+class Played {
+ public:
+  void OnSent() { ++sent_; }
+
+  void OnController(const controller_status_t& status) {
+    if (status.policy_iteration != 0 || status.purpose != policy_t::EVALUATE) return;
+    const bool complete = status.phase == controller_status_t::COMPLETE;
+    if (complete && !told_) {
+      if (begun_)
+        spdlog::info("{} episodes are done", status.num_episodes);
+      else if (sent_ < 2)
+        return;  // of a policy before
+      else
+        spdlog::warn(
+            "this policy has been played already: start the controller again, or give another "
+            "--evaluation-episodes");
+    }
+    told_ = complete;
+    begun_ = begun_ || (sent_ > 0 && !complete);
+  }
+
+ private:
+  int sent_ = 0;
+  bool begun_ = false, told_ = false;
+};
+
 /// Sends a policy of a file as the last one of a run would be sent, and trains nothing.
 int SendPolicy(Process& process, const Options& options) {
   const RobotDescription robot = LoadRobot(options.robot);
@@ -227,6 +255,10 @@ int SendPolicy(Process& process, const Options& options) {
   message.trial_steps = 0;
   process.messenger().Follow(robot.name);
   Publisher<policy_t> publisher(process.messenger(), "POLICY");
+  Played played;
+  Subscriber<controller_status_t> controller(
+      process.messenger(), "CONTROLLER_STATUS",
+      [&](const controller_status_t& status) { played.OnController(status); });
   spdlog::info("{}: sends {}, trains nothing", robot.name, options.policy);
   Periodic repeat(kRepeat, process.clock().Now());
   while (process.Wait(repeat.Remaining(process.clock().Now()))) {
@@ -234,6 +266,7 @@ int SendPolicy(Process& process, const Options& options) {
     repeat.Advance(process.clock().Now());
     message.utime = process.clock().Utime();
     publisher.Publish(message);
+    played.OnSent();
   }
   return 0;
 }
@@ -260,13 +293,14 @@ int main(int argc, char** argv) {
                                           "folder to checkpoint in and to resume from");
         app.add_option("--policy", options.policy,
                        "train nothing, send this policy: an ONNX model or a trainer's checkpoint")
+            ->check(plumb::NotEmpty())
             ->excludes(iterations, checkpoint);
         app.add_option("--threads", options.threads, "0 = all processors")
             ->check(CLI::Range(0, 1024))
             ->capture_default_str();
         app.add_option("--evaluation-episodes", options.evaluation_episodes,
                        "roll-outs of the last policy")
-            ->check(CLI::Range(1, 1000000))
+            ->check(CLI::Range(1, 10000))
             ->capture_default_str();
         plumb::AddExamples(app, {"plumb-trainer robots/pendulum --seed 3",
                                  "plumb-trainer robots/pendulum --policy policy.onnx"});

@@ -1,6 +1,7 @@
 #include "trainer/policy_file.h"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <filesystem>
 #include <fstream>
@@ -27,11 +28,16 @@ std::string ReadMagic(const std::string& file) {
   return magic;
 }
 
-GaussianPolicy FromCheckpoint(const std::string& file) {
-  const std::optional<Checkpoint> checkpoint = LoadCheckpoint(file);
+Checkpoint ReadCheckpoint(const std::string& file) {
+  std::optional<Checkpoint> checkpoint = LoadCheckpoint(file);
   if (!checkpoint) throw std::invalid_argument(file + ": there is no such policy");
+  return *std::move(checkpoint);
+}
+
+GaussianPolicy FromCheckpoint(const std::string& file) {
+  const Checkpoint checkpoint = ReadCheckpoint(file);
   try {
-    return GaussianPolicy::FromMessage(DeployedPolicy(*checkpoint));
+    return GaussianPolicy::FromMessage(DeployedPolicy(checkpoint));
   } catch (const std::invalid_argument& error) {
     throw std::invalid_argument(file + ": " + error.what());
   }
@@ -60,6 +66,18 @@ GaussianPolicy LoadPolicy(const std::string& file, const RobotDescription& robot
     throw std::invalid_argument(file + ": " + error.what());
   }
   return *std::move(policy);
+}
+
+void RequireTrained(const std::string& file, const RobotDescription& robot) {
+  if (IsOnnx(ReadMagic(file))) return;
+  const Checkpoint checkpoint = ReadCheckpoint(file);
+  if (checkpoint.incumbent < 0 && checkpoint.iteration == 0 && !checkpoint.complete) {
+    throw std::invalid_argument(
+        fmt::format("{}: its training has not ended, after {} updates", file, checkpoint.updates));
+  }
+  // `plumb train` notes no robot.
+  if (checkpoint.robot != 0 && checkpoint.robot != robot.fingerprint)
+    spdlog::warn("{}: robot.toml or its URDF has changed since it was trained", file);
 }
 
 }  // namespace plumb

@@ -16,4 +16,9 @@ namespace plumb {
 /// other effort limits or, as far as the file says, other names or another control period.
 GaussianPolicy LoadPolicy(const std::string& file, const RobotDescription& robot, const Task& task);
 
+/// Whether a robot may be run with a file's policy: it is an ONNX model's, or a checkpoint's of
+/// which at least one training has ended. Warns where the robot's files have changed since.
+/// Thread-safe. @throws std::invalid_argument if not, naming the file; as LoadPolicy.
+void RequireTrained(const std::string& file, const RobotDescription& robot);
+
 }  // namespace plumb

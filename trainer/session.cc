@@ -59,6 +59,7 @@ void RequireSendable(const RobotDescription& robot) {
 
 GaussianPolicy LoadSendablePolicy(const std::string& file, const RobotDescription& robot) {
   GaussianPolicy policy = LoadPolicy(file, robot, *MakeTask(robot));
+  RequireTrained(file, robot);
   try {
     RequireSendable(policy);
   } catch (const std::invalid_argument& error) {

@@ -20,8 +20,8 @@ namespace plumb {
 void RequireSendable(const GaussianPolicy& policy);
 void RequireSendable(const RobotDescription& robot);
 
-/// The policy of a file, to be sent. @throws as LoadPolicy (trainer/policy_file.h) and
-/// RequireSendable, naming the file. Thread-safe.
+/// The policy of a file, to be sent. Warns as RequireTrained. Thread-safe. @throws as LoadPolicy,
+/// RequireTrained (trainer/policy_file.h) and RequireSendable, naming the file.
 GaussianPolicy LoadSendablePolicy(const std::string& file, const RobotDescription& robot);
 
 /// The trainer's part of SimOpt: for each distribution of simulators a policy. Iteration 0 trains

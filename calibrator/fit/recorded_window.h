@@ -54,7 +54,8 @@ const Eigen::VectorXd& NearEnd(const Transition& transition);
 /// Whether that entry was observed at all: of a quaternion all or nothing.
 bool IsObserved(const ConfigurationSpace& space, const Transition& transition, Eigen::Index c);
 /// Mean of the squared errors of (q, v) over the entries that were observed at a transition's end,
-/// in units of `scale`, 2 n of them; infinite where the prediction is not finite.
+/// in units of `scale`, 2 n of them; infinite where the prediction is not finite, or nothing was
+/// observed.
 double MeanSquaredError(const ConfigurationSpace& space, const Eigen::Ref<const Eigen::VectorXd>& q,
                         const Eigen::Ref<const Eigen::VectorXd>& v, const Transition& transition,
                         const Eigen::VectorXd& scale);

@@ -174,7 +174,7 @@ Eigen::VectorXd SimOpt::Evaluate(const Eigen::MatrixXd& samples) {
 
 void SimOpt::Infer() {
   ++state_.search.update;
-  if (CountTransitions(state_.rollouts) == 0) return;  // nothing is known: keep it
+  if (CountTransitions(state_.rollouts) == 0) return Keep("no motion has been recorded");
   try {
     const GapFit fit = RunFromWhereItIs();
     const MethodResult& result = fit.result;
@@ -192,9 +192,16 @@ void SimOpt::Infer() {
     failures_ += result.failures;
     state_.warnings = result.warnings;
   } catch (const std::invalid_argument& error) {
-    state_.warnings = {std::string("the distribution stays as it is: ") + error.what()};
-    state_.explained = false;
+    Keep(error.what());
   }
+}
+
+// Whether the model explains what was recorded last, nobody can tell then.
+void SimOpt::Keep(const std::string& why) {
+  state_.warnings = {"the distribution stays as it is: " + why};
+  state_.explained = false;
+  state_.alarm.clear();
+  state_.gap = state_.warnings.front();
 }
 
 // One mode leads to the next iteration's. Of several none may be given up, and in the beginning

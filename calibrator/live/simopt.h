@@ -140,6 +140,7 @@ class SimOpt {
   RepsOptions SearchOptions() const;
   Eigen::VectorXd Evaluate(const Eigen::MatrixXd& samples);
   void Infer();
+  void Keep(const std::string& why);
   GapFit RunFromWhereItIs() const;
   std::span<const Rollout> Newest() const;
 

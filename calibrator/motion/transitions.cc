@@ -109,12 +109,16 @@ const robot_state_t* TransitionJoiner::FindState(int64_t sequence) const {
   return found == states_.end() ? nullptr : &found->second;
 }
 
-// At a later time, or so far behind that no delay explains it: its clock may have been set back.
+// Its clock may have been set back: then it is too far behind for a delay to explain it, or
+// numbered among what is remembered and earlier than all of it.
 bool TransitionJoiner::BeginsRun(const robot_state_t& smoothed) const {
   if (states_.empty()) return false;
-  const auto& [newest, state] = *states_.rbegin();
-  return smoothed.sequence < newest - kReordered ||
-         (smoothed.sequence <= newest && smoothed.utime > state.utime);
+  const auto& [first, oldest] = *states_.begin();
+  const auto& [last, newest] = *states_.rbegin();
+  if (smoothed.sequence < last - kReordered) return true;
+  return smoothed.sequence <= last &&
+         (smoothed.utime > newest.utime ||
+          (smoothed.sequence >= first && smoothed.utime < oldest.utime));
 }
 
 void TransitionJoiner::OnState(const robot_state_t& smoothed) {

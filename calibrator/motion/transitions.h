@@ -82,11 +82,13 @@ class TransitionJoiner {
   /// Nothing is forgotten but by Forget.
   static TransitionJoiner Unbounded(const RobotDescription& robot);
 
-  /// Whether a state is of a driver that has been started again since the newest one: it counts
-  /// from 0 again. States of one driver come in about their order.
+  /// Whether a state is of a driver that has been started again since the newest one, which counts
+  /// from 0 then: it is later with a lower number, is numbered 1000 lower, or is earlier than all
+  /// that are remembered without a lower number. States of one driver come in about their order.
   bool BeginsRun(const robot_state_t& smoothed) const;
 
-  /// Ignores states of another robot's size, and sequences beyond kMaxSequence.
+  /// Ignores states of another robot's size, sequences below 0 or beyond kMaxSequence, and times
+  /// that are none. One that begins a run makes it forget all states and episodes.
   void OnState(const robot_state_t& smoothed);
   void OnCommand(const joint_command_t& command);
 

@@ -86,15 +86,16 @@ FrameUse CanSimpleReports::OnVersion(const FieldValues& v) noexcept {
 }
 
 // A motor without a thermistor has NaN (ODrive firmware 0.5, MotorControl/thermistor.hpp), and the
-// power stage's temperature counts all the same. What was a number, and no longer is, has broken.
+// power stage's temperature counts all the same. What was a number, and no longer is, has broken:
+// that frame is refused, which is seen, but a power stage is watched on.
 FrameUse CanSimpleReports::OnTemperatures(const FieldValues& v, int64_t now) noexcept {
   const auto good = [](double next, double known) {
     return std::isfinite(next) || (std::isnan(next) && std::isnan(known));
   };
+  if (std::isfinite(v[0])) readings_.drive_temperature = v[0];
   const bool none = std::isnan(v[0]) && std::isnan(v[1]);
   if (none || !good(v[0], readings_.drive_temperature) || !good(v[1], readings_.motor_temperature))
     return FrameUse::kRejected;
-  readings_.drive_temperature = v[0];
   readings_.motor_temperature = v[1];
   readings_.temperatures_at = now;
   return FrameUse::kConsumed;

@@ -14,8 +14,9 @@ namespace plumb {
 /// restarted. Pure logic; free of exceptions and allocation. Not thread-safe.
 class CanSimpleReports {
  public:
-  /// @param frame of the drive's id, not remote. kRejected for what is too short, not finite or
-  /// unknown, kNotFinite for encoder estimates that are not.
+  /// @param frame of the drive's id, not remote. kRejected for what is too short, unknown or
+  /// not finite, but for a temperature that has never been a number; kNotFinite for encoder
+  /// estimates that are not.
   FrameUse OnFrame(const Frame& frame, int64_t now) noexcept;
   /// Call it with each heartbeat.
   void OnHeartbeat(int axis_state, int64_t now) noexcept;

@@ -105,6 +105,7 @@ TEST_CASE("wrong flags are usage errors") {
   for (const auto& [in_vain, words] : std::vector<std::pair<std::vector<std::string>, std::string>>{
            {{"--can-log", stage.folder / "can.log", "--real-time"}, "--real-time excludes"},
            {{"--can-log", stage.folder / "can.log", "--real"}, "--real excludes"},
+           {{"--policy", ""}, "--policy: is empty"},  // as of a variable that is not set
            {{"--realtime-priority", "50"}, "needs --real-time or --real"}}) {
     std::vector<std::string> arguments{Stage::Binary("plumb"), "launch", stage.robot_folder,
                                        "--output", stage.folder / "run"};

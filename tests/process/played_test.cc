@@ -68,6 +68,21 @@ TEST_CASE("a policy of a file runs on the robot, and nothing is learnt") {
   CHECK_THAT(Read(report), Contains("of 3 roll-outs"));
   CHECK(play("again").at("evaluation_returns") == summary.at("evaluation_returns"));
 
+  stage.Start("plumb-trainer", {"--policy", policy});
+  controller_status_t complete{};  // of a controller that has played it
+  complete.phase = controller_status_t::COMPLETE;
+  complete.purpose = policy_t::EVALUATE;
+  Publisher<controller_status_t> controller(stage.messenger, "CONTROLLER_STATUS");
+  const auto told = [&] {
+    return Contains("has been played already").match(stage.Log("plumb-trainer"));
+  };
+  for (int i = 0; i < 300 && !told(); ++i) {
+    controller.Publish(complete);
+    stage.Listen(0.1);
+  }
+  CHECK(told());
+  stage.Kill("plumb-trainer");
+
   std::ofstream(policy) << "no policy";
   Child refused = Launch(stage, {"--policy", policy}, "refused");
   stage.WaitUntil([&] { return !refused.running(); }, kLong);

@@ -39,6 +39,8 @@ TEST_CASE("A run that is interrupted and resumed ends in the same bits") {
   first.Begin(Distribution(0));
   for (int i = 0; i < 3; ++i) first.Advance();
   SaveCheckpoint(CheckpointIn(folder), first.MakeCheckpoint());
+  CHECK_THROWS_WITH(LoadSendablePolicy(CheckpointIn(folder), PendulumRobot()),
+                    Catch::Contains("its training has not ended, after 3 updates"));
 
   TrainingSession second = NewSession();
   second.Restore(LoadCheckpoint(CheckpointIn(folder)).value());
@@ -51,6 +53,7 @@ TEST_CASE("A run that is interrupted and resumed ends in the same bits") {
   // And once more, between iterations: the policy is there to be sent again, the next distribution
   // is awaited.
   SaveCheckpoint(CheckpointIn(folder), second.MakeCheckpoint());
+  CHECK_NOTHROW(LoadSendablePolicy(CheckpointIn(folder), PendulumRobot()));
   TrainingSession third = NewSession();
   third.Restore(LoadCheckpoint(CheckpointIn(folder)).value());
   CHECK(third.complete());

@@ -57,7 +57,5 @@ TEST_CASE("an iteration begins when its roll-outs are complete, whatever came fi
   CHECK_FALSE(calibrator.ready());
 }
 
-// Whoever can send messages can send any number of them.
-
 }  // namespace
 }  // namespace plumb

@@ -175,6 +175,7 @@ TEST_CASE(
   REQUIRE(report);
   CHECK(KlDivergence(Moments(simopt.state().distribution), PriorGaussian(robot)) ==
         Approx(0).margin(1e-12));
+  CHECK_THAT(simopt.state().gap, Catch::Contains("no motion has been recorded"));
   Rollout unseen = Synthetic(robot, 1);
   for (Transition& t : unseen.transitions) t.next_q(0) = t.next_v(0) = NAN;
   simopt.Begin({unseen});
@@ -182,10 +183,13 @@ TEST_CASE(
   REQUIRE(report);
   REQUIRE(report->warnings.size() == 1);
   CHECK_THAT(report->warnings[0], Catch::Contains("stays as it is"));
+  CHECK(simopt.state().gap == report->warnings[0]);  // whether it explains this nobody can tell
+  CHECK_FALSE(simopt.state().explained);
   simopt.Begin({Synthetic(robot, 2)});
   CHECK(simopt.Update());
   CHECK(simopt.state().iteration == 3);
   CHECK(simopt.state().kl > 1);
+  CHECK(simopt.state().gap.empty());
   CHECK_THROWS_WITH(SimOpt(robot, 1, 1, "laplas"), Catch::Contains("did you mean 'laplace'"));
 }
 

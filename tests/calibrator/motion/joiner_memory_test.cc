@@ -20,6 +20,7 @@ TEST_CASE_METHOD(RecordedEpisode,
   CHECK(joiner.Join(42, 300).transitions.empty());
 }
 
+// Whoever can send messages can send any number of them.
 TEST_CASE("what is remembered of messages has a bound in megabytes") {
   const RobotDescription robot = Pendulum();
   const auto used = [] { return mallinfo2().uordblks + mallinfo2().hblkhd; };
@@ -83,6 +84,10 @@ TEST_CASE_METHOD(RecordedEpisode,
   States(5000, 5010);
   CHECK_FALSE(joiner.BeginsRun(SmoothedState(4990)));  // it was late
   CHECK(joiner.BeginsRun(SmoothedState(90)));
+  robot_state_t early = SmoothedState(5005);
+  CHECK_FALSE(joiner.BeginsRun(early));  // it came twice
+  early.utime = SmoothedState(90).utime;
+  CHECK(joiner.BeginsRun(early));
   States();
   CHECK(joiner.newest_state() == 310);
   Commands();

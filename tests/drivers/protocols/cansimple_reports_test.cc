@@ -96,8 +96,9 @@ TEST_CASE("a motor without a thermistor leaves its power stage's temperature kno
   CHECK(bench.Use("035#000026420000807F") == FrameUse::kRejected);  // infinite
   CHECK(bench.Use("035#0000264200001142") == FrameUse::kConsumed);
   CHECK(bench.motor->readings().motor_temperature == 36.25);
-  CHECK(bench.Use("035#000026420000C07F") == FrameUse::kRejected);  // it had one
+  CHECK(bench.Use("035#000040420000C07F") == FrameUse::kRejected);  // it had one
   CHECK(bench.motor->readings().motor_temperature == 36.25);
+  CHECK(bench.motor->readings().drive_temperature == 48);
 }
 
 TEST_CASE("the drive says what it is when it is armed") {
