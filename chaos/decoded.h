@@ -1,9 +1,8 @@
 #pragma once
 
-#include <cstdint>
 #include <optional>
-#include <span>
 
+#include "common/message_bytes.h"
 #include "common/seal.h"
 #include "plumb/lockstep_post_t.hpp"
 
@@ -14,9 +13,7 @@ namespace plumb {
 template <class Message>
 std::optional<Message> Decoded(const lockstep_post_t& post) {
   Message message;
-  const std::span<const uint8_t> bytes = Unsealed(post.data);
-  const int size = static_cast<int>(bytes.size());
-  if (message.decode(bytes.data(), 0, size) != size) return std::nullopt;
+  if (!Decode(Unsealed(post.data), message)) return std::nullopt;
   return message;
 }
 

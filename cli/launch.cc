@@ -19,6 +19,7 @@
 #include "cli/run_processes.h"
 #include "cli/run_setting.h"
 #include "common/atomic_file.h"
+#include "common/message_bytes.h"
 #include "common/outside_text.h"
 #include "common/progress_line.h"
 #include "common/seal.h"
@@ -131,9 +132,7 @@ class ClosedLoop {
   /// A run in virtual time hears nobody else; but whoever wants it to stop is obeyed.
   void OnStranger(const std::string& channel, const std::vector<uint8_t>& message) {
     driver_request_t request;
-    const std::span<const uint8_t> bytes = Unsealed(message);
-    const int size = static_cast<int>(bytes.size());
-    if (channel == "DRIVER_REQUEST" && request.decode(bytes.data(), 0, size) == size &&
+    if (channel == "DRIVER_REQUEST" && Decode(Unsealed(message), request) &&
         (request.request == driver_request_t::DISARM ||
          request.request == driver_request_t::ESTOP)) {
       stopped_from_outside_ = true;

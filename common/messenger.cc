@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "common/clock.h"
+#include "common/message_bytes.h"
 #include "plumb/driver_status_t.hpp"
 
 namespace plumb {
@@ -143,9 +144,7 @@ void Messenger::OnDriverStatus(std::span<const uint8_t> bytes) noexcept {
   if (seal && seal->run == identity_.run()) return;
   try {
     driver_status_t status;
-    const std::span<const uint8_t> message = Unsealed(bytes);
-    const int length = static_cast<int>(message.size());
-    if (status.decode(message.data(), 0, length) != length) return;
+    if (!Decode(Unsealed(bytes), status)) return;
     if (!identity_.Follows(status.robot)) return OnForeignDriver("of another robot");
     const ChannelJudge::Verdict verdict =
         driver_judge_.HearDriver(identity_, status.robot, status.bus, bytes);

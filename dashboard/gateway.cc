@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "common/message_bytes.h"
 #include "common/message_json.h"
 #include "common/message_schema.h"
 #include "common/message_walk.h"
@@ -39,11 +40,9 @@ constexpr char kChannelsSchema[] =
     R"("refused":{"type":"integer"},"age_ms":{"type":"number"}}}}}})";
 
 template <class Message>
-std::optional<Message> Decode(std::span<const uint8_t> bytes) {
+std::optional<Message> Decoded(std::span<const uint8_t> bytes) {
   Message message;
-  const std::span<const uint8_t> content = Unsealed(bytes);
-  const int size = static_cast<int>(content.size());
-  if (message.decode(content.data(), 0, size) != size) return std::nullopt;
+  if (!Decode(Unsealed(bytes), message)) return std::nullopt;
   return message;
 }
 
@@ -141,16 +140,17 @@ void Gateway::Rewind(int64_t utime, int64_t now) {
 void Gateway::Use(const std::string& channel, std::span<const uint8_t> message, bool repeated,
                   const Moment& moment) {
   if (channel == "ROBOT_STATE") {
-    state_ = Decode<robot_state_t>(message);
+    state_ = Decoded<robot_state_t>(message);
     if (state_) derived_.OnState(*state_, Utime(moment), moment.now);
   } else if (channel == "DRIVER_STATUS") {
-    if (const auto status = Decode<driver_status_t>(message)) wishes_.OnStatus(*status, moment.now);
+    if (const auto status = Decoded<driver_status_t>(message))
+      wishes_.OnStatus(*status, moment.now);
   } else if (channel == "PLACE_ROBOT") {
-    place_ = Decode<place_robot_t>(message);
+    place_ = Decoded<place_robot_t>(message);
   } else if (channel == "CONTROLLER_STATUS") {
-    controller_ = Decode<controller_status_t>(message);
+    controller_ = Decoded<controller_status_t>(message);
   } else if (channel == "PARAMETER_DISTRIBUTION" && !repeated) {
-    if (const auto distribution = Decode<parameter_distribution_t>(message))
+    if (const auto distribution = Decoded<parameter_distribution_t>(message))
       derived_.OnDistribution(*distribution, Utime(moment));
   }
 }

@@ -12,6 +12,7 @@
 
 #include "common/atomic_file.h"
 #include "common/lcm_log_reader.h"
+#include "common/message_bytes.h"
 #include "common/message_json.h"
 #include "common/message_schema.h"
 #include "common/message_type.h"
@@ -96,8 +97,7 @@ class Scenes {
     const bool back = event.utime < last_;
     if (any_ && !back && event.utime - last_ < kScenePeriod) return false;
     robot_state_t state;
-    const int size = static_cast<int>(event.message.size());
-    if (state.decode(event.message.data(), 0, size) != size) return false;
+    if (!Decode(event.message, state)) return false;
     const Eigen::VectorXd q = Eigen::Map<const Eigen::VectorXd>(
         state.q.data(), static_cast<Eigen::Index>(state.q.size()));
     if (q.size() != robot_.num_positions() || !q.allFinite()) return false;

@@ -5,6 +5,8 @@
 #include <functional>
 #include <string>
 
+#include "common/message_bytes.h"
+
 namespace plumb {
 
 // The functions here share nothing: thread-safe if the given function is, which the caller's thread
@@ -30,7 +32,7 @@ LogEnd ReadLog(const std::string& file,
 template <class Message>
 bool Decodes(const void* data, int size, Message& message) noexcept {
   try {
-    return message.decode(data, 0, size) == size;
+    return Decode({static_cast<const uint8_t*>(data), static_cast<size_t>(size)}, message);
   } catch (const std::exception&) {
     return false;
   }
