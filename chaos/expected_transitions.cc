@@ -4,7 +4,7 @@
 #include <cmath>
 #include <iterator>
 
-#include "chaos/decoded.h"
+#include "common/decoded.h"
 #include "common/seal.h"
 #include "plumb/driver_status_t.hpp"
 #include "plumb/policy_t.hpp"
@@ -50,18 +50,18 @@ void ExpectedTransitions::Hear(const lockstep_post_t& post) {
   if (post.topic.kind == lockstep_topic_t::FRAME) return;
   const std::string& channel = post.topic.name;
   if (channel == "ROBOT_STATE_SMOOTHED") {
-    const auto state = Decoded<robot_state_t>(post);
+    const auto state = Decoded<robot_state_t>(post.data);
     if (state && Believed(post)) OnState(*state);
   } else if (channel == "JOINT_COMMAND") {
-    const auto command = Decoded<joint_command_t>(post);
+    const auto command = Decoded<joint_command_t>(post.data);
     if (command && Believed(post)) OnCommand(*command);
   } else if (channel == "CONTROLLER_STATUS") {
-    const auto status = Decoded<controller_status_t>(post);
+    const auto status = Decoded<controller_status_t>(post.data);
     if (status && Believed(post) && status->phase == controller_status_t::COMPLETE &&
         status->purpose == policy_t::CALIBRATE && status->num_episodes > 0)
       complete_ = *status;
   } else if (channel == "DRIVER_STATUS") {
-    if (Decoded<driver_status_t>(post)) Believed(post);
+    if (Decoded<driver_status_t>(post.data)) Believed(post);
   }
   if (complete_) Complete();
 }

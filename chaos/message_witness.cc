@@ -7,7 +7,7 @@
 #include <cmath>
 #include <span>
 
-#include "chaos/decoded.h"
+#include "common/decoded.h"
 #include "common/seal.h"
 #include "plumb/calibration_status_t.hpp"
 #include "plumb/controller_status_t.hpp"
@@ -115,20 +115,20 @@ void MessageWitness::OnSaid(int64_t time, const lockstep_post_t& post, const std
   if (post.topic.kind == lockstep_topic_t::FRAME || speaker.empty()) return;
   const std::string& channel = post.topic.name;
   if (channel == "JOINT_STATE") {
-    if (const auto m = Decoded<joint_state_t>(post)) RequireFinite(time, channel, *m);
+    if (const auto m = Decoded<joint_state_t>(post.data)) RequireFinite(time, channel, *m);
   } else if (channel == "ROBOT_STATE" || channel == "ROBOT_STATE_SMOOTHED") {
-    if (const auto m = Decoded<robot_state_t>(post)) RequireFinite(time, channel, *m);
+    if (const auto m = Decoded<robot_state_t>(post.data)) RequireFinite(time, channel, *m);
   } else if (channel == "IMU") {
-    if (const auto m = Decoded<imu_t>(post)) RequireFinite(time, channel, *m);
+    if (const auto m = Decoded<imu_t>(post.data)) RequireFinite(time, channel, *m);
   } else if (channel == "JOINT_COMMAND") {
-    if (const auto m = Decoded<joint_command_t>(post)) RequireFinite(time, channel, *m);
+    if (const auto m = Decoded<joint_command_t>(post.data)) RequireFinite(time, channel, *m);
   } else if (channel == "POLICY") {
-    const auto m = Decoded<policy_t>(post);
+    const auto m = Decoded<policy_t>(post.data);
     if (!m) return;
     RequireFinite(time, channel, *m);
     RequireRising(time, channel, m->iteration);
   } else if (channel == "PARAMETER_DISTRIBUTION") {
-    const auto m = Decoded<parameter_distribution_t>(post);
+    const auto m = Decoded<parameter_distribution_t>(post.data);
     if (!m) return;
     RequireFinite(time, channel, *m);
     RequireRising(time, channel, m->iteration);
@@ -138,7 +138,7 @@ void MessageWitness::OnSaid(int64_t time, const lockstep_post_t& post, const std
       chronicle_.Violate(6, time, fmt::format("distribution {} has changed", m->iteration));
     iteration_ = std::max(iteration_, m->iteration);
   } else if (channel == "CALIBRATION_STATUS") {
-    const auto m = Decoded<calibration_status_t>(post);
+    const auto m = Decoded<calibration_status_t>(post.data);
     if (!m) return;
     RequireFinite(time, channel, *m);
     RequireRising(time, channel, m->iteration);
@@ -147,14 +147,14 @@ void MessageWitness::OnSaid(int64_t time, const lockstep_post_t& post, const std
     // With those of a roll-out under way: what is in use when the iteration is complete.
     transitions_.try_emplace(m->iteration, m->transitions);
   } else if (channel == "TRAINING_STATUS") {
-    const auto m = Decoded<training_status_t>(post);
+    const auto m = Decoded<training_status_t>(post.data);
     if (!m) return;
     NoteChange(time, "trainer",
                fmt::format("iteration {}{}", m->iteration, m->complete ? " complete" : ""));
     // One that was not complete may be begun anew.
     if (m->complete) RequireRising(time, channel, m->iteration);
   } else if (channel == "CONTROLLER_STATUS") {
-    const auto m = Decoded<controller_status_t>(post);
+    const auto m = Decoded<controller_status_t>(post.data);
     if (!m) return;
     NoteChange(time, "controller",
                fmt::format("policy {}: {} {}", m->policy_iteration,
@@ -162,7 +162,7 @@ void MessageWitness::OnSaid(int64_t time, const lockstep_post_t& post, const std
     RequireFinite(time, channel, *m);
     RequireRising(time, channel, m->policy_iteration);
   } else if (channel == "DRIVER_STATUS") {
-    if (const auto m = Decoded<driver_status_t>(post)) {
+    if (const auto m = Decoded<driver_status_t>(post.data)) {
       NoteChange(
           time, "driver",
           std::string(kDriverStates[static_cast<unsigned char>(m->state)]) + " " + m->reason);

@@ -9,7 +9,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "chaos/decoded.h"
+#include "common/decoded.h"
 #include "common/seal.h"
 #include "common/time_units.h"
 #include "plumb/driver_request_t.hpp"
@@ -110,7 +110,7 @@ TorqueWitness::Node* TorqueWitness::Find(uint32_t id) {
 
 void TorqueWitness::OnSaid(int64_t time, const lockstep_post_t& post, const std::string& speaker) {
   if (speaker == "plumb-driver" && post.topic.name == "DRIVER_STATUS") {
-    const auto status = Decoded<driver_status_t>(post);
+    const auto status = Decoded<driver_status_t>(post.data);
     if (!status) return;
     armed_ = status->state == driver_status_t::ARMED;
     return OnDriverState(time, armed_ || status->state == driver_status_t::ARMING);
@@ -138,7 +138,7 @@ void TorqueWitness::OnHeard(const lockstep_post_t& post, const std::string& spea
   if (listener != "plumb-driver") return;
   if (frame) return OnDriverHears(*frame, post.arrival);
   if (post.topic.name == "DRIVER_REQUEST") {
-    const auto request = Decoded<driver_request_t>(post);
+    const auto request = Decoded<driver_request_t>(post.data);
     if (!request) return;
     const bool arm = request->request == driver_request_t::ARM ||
                      request->request == driver_request_t::ARM_HOMED;
@@ -147,7 +147,7 @@ void TorqueWitness::OnHeard(const lockstep_post_t& post, const std::string& spea
       stops_.push_back(post.arrival);
     if (arm && genuine) arms_.push_back(post.arrival);
   } else if (post.topic.name == "JOINT_COMMAND" && genuine) {
-    const auto command = Decoded<joint_command_t>(post);
+    const auto command = Decoded<joint_command_t>(post.data);
     if (!command) return;
     const bool plain = std::ranges::all_of(command->kp, [](double x) { return std::isnan(x); }) &&
                        std::ranges::all_of(command->kd, [](double x) { return std::isnan(x); });

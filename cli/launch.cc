@@ -19,10 +19,9 @@
 #include "cli/run_processes.h"
 #include "cli/run_setting.h"
 #include "common/atomic_file.h"
-#include "common/message_bytes.h"
+#include "common/decoded.h"
 #include "common/outside_text.h"
 #include "common/progress_line.h"
-#include "common/seal.h"
 #include "common/time_units.h"
 #include "plumb/driver_request_t.hpp"
 
@@ -131,12 +130,12 @@ class ClosedLoop {
 
   /// A run in virtual time hears nobody else; but whoever wants it to stop is obeyed.
   void OnStranger(const std::string& channel, const std::vector<uint8_t>& message) {
-    driver_request_t request;
-    if (channel == "DRIVER_REQUEST" && Decode(Unsealed(message), request) &&
-        (request.request == driver_request_t::DISARM ||
-         request.request == driver_request_t::ESTOP)) {
+    const auto request =
+        channel == "DRIVER_REQUEST" ? Decoded<driver_request_t>(message) : std::nullopt;
+    if (request && (request->request == driver_request_t::DISARM ||
+                    request->request == driver_request_t::ESTOP)) {
       stopped_from_outside_ = true;
-      requests_.Publish(request);  // so that whoever has asked is answered
+      requests_.Publish(*request);  // so that whoever has asked is answered
     } else if (channel.starts_with("DRAKE_VIEWER_")) {
       // Who shows the robot says nothing to the run.
     } else if (strange_channels_.size() < kMaxStrangeChannels &&

@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "common/message_bytes.h"
+#include "common/decoded.h"
 #include "common/message_json.h"
 #include "common/message_schema.h"
 #include "common/message_walk.h"
@@ -38,13 +38,6 @@ constexpr char kChannelsSchema[] =
     R"("rate":{"type":"number"},"jitter_ms":{"type":"number"},)"
     R"("bytes_per_second":{"type":"number"},"undecodable":{"type":"integer"},)"
     R"("refused":{"type":"integer"},"age_ms":{"type":"number"}}}}}})";
-
-template <class Message>
-std::optional<Message> Decoded(std::span<const uint8_t> bytes) {
-  Message message;
-  if (!Decode(Unsealed(bytes), message)) return std::nullopt;
-  return message;
-}
 
 }  // namespace
 
