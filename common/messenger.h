@@ -17,6 +17,7 @@
 #include "common/lcm_receiver.h"
 #include "common/lcm_url.h"
 #include "common/lockstep/participant.h"
+#include "common/message_bytes.h"
 
 namespace plumb {
 
@@ -153,9 +154,7 @@ class Subscriber {
     try {
       // The two members take turns and keep their vectors' capacity: no allocation for messages of
       // equal size.
-      const std::span<const uint8_t> message = Unsealed(bytes);
-      const int length = static_cast<int>(message.size());
-      if (arriving_.decode(message.data(), 0, length) != length) {
+      if (!Decode(Unsealed(bytes), arriving_)) {
         arriving_ = {};  // which may be a hundred times as large as what it was refused for
         ++rejected_;
         return;

@@ -8,6 +8,7 @@
 
 #include "common/special_numbers.h"
 #include "common/time_units.h"
+#include "robot/rotation_vector.h"
 #include "robot/twist_angle.h"
 
 namespace plumb {
@@ -228,7 +229,7 @@ void BaseObserver::Fill(int64_t utime, robot_state_t& state) const {
       rate_sd[i] = std::hypot(odometry_.rate_sd(axis), odometry_.rate_change());
       angle_sd[i] = std::hypot(odometry_.angle_sd(orientation * axis), ahead * rate_sd[i]);
     }
-    SetTurn(orientation * LegOdometry::Turn(ahead * rates), rates, angle_sd, rate_sd, state);
+    SetTurn(orientation * FromRotationVector(ahead * rates), rates, angle_sd, rate_sd, state);
     return;
   }
   const double rate = base_.axis.dot(rates);

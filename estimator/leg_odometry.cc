@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 
+#include "robot/rotation_vector.h"
+
 namespace plumb {
 namespace {
 
@@ -43,12 +45,6 @@ Matrix3d Cross(const Vector3d& a) {
 }
 
 }  // namespace
-
-Eigen::Quaterniond LegOdometry::Turn(const Vector3d& by) {
-  const double angle = by.norm();
-  if (angle < 1e-12) return Eigen::Quaterniond(1, by.x() / 2, by.y() / 2, by.z() / 2).normalized();
-  return Eigen::Quaterniond(Eigen::AngleAxisd(angle, by / angle));
-}
 
 LegOdometry::LegOdometry(const Settings& settings, size_t num_feet)
     : s_(settings),
@@ -108,7 +104,7 @@ void LegOdometry::Predict(double dt, const Vector3d& rate, const Vector3d& force
   rate_change_ = (rate_ - last_rate).norm();
   // A gyro's readings are of their times, an accelerometer's are averages.
   const Vector3d turn = dt * ((rate_ + last_rate) / 2 - rate_bias_);
-  const Matrix3d half = (orientation_ * Turn(turn / 2)).toRotationMatrix();
+  const Matrix3d half = (orientation_ * FromRotationVector(turn / 2)).toRotationMatrix();
   const Vector3d felt = allowed_ * (half * (force - acceleration_bias_));
   acceleration_change_ = force_ ? (felt - *force_).norm() : 0;
   force_ = felt;
@@ -121,7 +117,7 @@ void LegOdometry::Predict(double dt, const Vector3d& rate, const Vector3d& force
 
   position_ += dt * velocity_ + dt * dt / 2 * acceleration_;
   velocity_ += dt * acceleration_;
-  orientation_ = (orientation_ * Turn(turn)).normalized();
+  orientation_ = (orientation_ * FromRotationVector(turn)).normalized();
 
   // F P F': each row of the transition is used before what it refers to changes.
   const Matrix3d by_angle = -dt * Cross(felt), by_acceleration_bias = -dt * half,
@@ -225,7 +221,7 @@ bool LegOdometry::CorrectBy(size_t index, const Foot& foot) {
 void LegOdometry::Shift() {
   position_ += error_.segment<3>(kPosition);
   velocity_ += error_.segment<3>(kVelocity);
-  orientation_ = (Turn(error_.segment<3>(kAngle)) * orientation_).normalized();
+  orientation_ = (FromRotationVector(error_.segment<3>(kAngle)) * orientation_).normalized();
   rate_bias_ += error_.segment<3>(kRateBias);
   acceleration_bias_ += error_.segment<3>(kAccelerationBias);
   for (size_t i = 0; i < feet_.size(); ++i) {

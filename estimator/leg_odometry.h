@@ -122,8 +122,6 @@ class LegOdometry {
       Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMax, kMax>;
   /// Of the whole error.
   const Covariance& whole_covariance() const { return covariance_; }
-  /// The rotation by a vector.
-  static Eigen::Quaterniond Turn(const Eigen::Vector3d& by);
   /// From now on it is told what is done with each reading. It must outlive this.
   void Tell(LegSmoother& smoother) { smoother_ = &smoother; }
 

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "common/time_units.h"
+#include "robot/rotation_vector.h"
 
 namespace plumb {
 namespace {
@@ -151,7 +152,7 @@ void LegSmoother::Smooth(const Reading& reading, Motion* motion) {
   motion->position += error.segment<3>(kPosition);
   motion->velocity += error.segment<3>(kVelocity);
   motion->orientation =
-      (LegOdometry::Turn(error.segment<3>(kAngle)) * motion->orientation).normalized();
+      (FromRotationVector(error.segment<3>(kAngle)) * motion->orientation).normalized();
   motion->rate -= error.segment<3>(kRateBias);
   part_.noalias() = rows * information_;
   motion->covariance = reading.covariance.topLeftCorner<12, 12>();

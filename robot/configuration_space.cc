@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "robot/rotation_vector.h"
+
 namespace plumb {
 namespace {
 
@@ -20,23 +22,9 @@ void Put(const Quaterniond& turn, Eigen::Index i, Eigen::Ref<Eigen::VectorXd> q)
   q.segment<4>(i) << turn.w(), turn.x(), turn.y(), turn.z();
 }
 
-// Of lengths that do not matter.
-Vector3d Log(const Quaterniond& turn) {
-  const double sine = turn.vec().norm(), cosine = turn.w();
-  if (sine == 0) return 2 * turn.vec();  // or NaN
-  const double angle = cosine < 0 ? 2 * std::atan2(-sine, -cosine) : 2 * std::atan2(sine, cosine);
-  return angle / sine * turn.vec();
-}
-
-Quaterniond Exp(const Vector3d& step) {
-  const double angle = step.norm();
-  if (angle < 1e-9) return Quaterniond(1, step.x() / 2, step.y() / 2, step.z() / 2).normalized();
-  return Quaterniond(Eigen::AngleAxisd(angle, step / angle));
-}
-
 Vector3d TurnBetween(const ConfigurationSpace::Vector& a, const ConfigurationSpace::Vector& b,
                      Eigen::Index position) {
-  return Log(QuaternionAt(b, position).conjugate() * QuaternionAt(a, position));
+  return ToRotationVector(QuaternionAt(b, position).conjugate() * QuaternionAt(a, position));
 }
 
 }  // namespace
@@ -96,7 +84,8 @@ Eigen::VectorXd ConfigurationSpace::At(const Vector& coordinates, const Vector& 
     if (at >= 0) q[at] = coordinates[c];
   }
   for (const Turn& turn : turns_) {
-    Put((QuaternionAt(about, turn.position) * Exp(coordinates.segment<3>(turn.velocity)))
+    Put((QuaternionAt(about, turn.position) *
+         FromRotationVector(coordinates.segment<3>(turn.velocity)))
             .normalized(),
         turn.position, q);
   }
@@ -115,7 +104,8 @@ void ConfigurationSpace::MoveInPlace(const Vector& step, Eigen::Ref<Eigen::Vecto
     if (at >= 0) q[at] += step[c];
   }
   for (const Turn& turn : turns_) {
-    Put((QuaternionAt(q, turn.position) * Exp(step.segment<3>(turn.velocity))).normalized(),
+    Put((QuaternionAt(q, turn.position) * FromRotationVector(step.segment<3>(turn.velocity)))
+            .normalized(),
         turn.position, q);
   }
 }
@@ -128,7 +118,7 @@ void ConfigurationSpace::Move(Eigen::Index c, double by, Eigen::Ref<Eigen::Vecto
   auto turn = turns_.begin();
   while (c >= turn->velocity + 3) ++turn;
   const Vector3d step = by * Vector3d::Unit(c - turn->velocity);
-  Put((QuaternionAt(q, turn->position) * Exp(step)).normalized(), turn->position, q);
+  Put((QuaternionAt(q, turn->position) * FromRotationVector(step)).normalized(), turn->position, q);
 }
 
 std::string ConfigurationSpace::Normalise(const Vector& like, Eigen::Ref<Eigen::VectorXd> q) const {

@@ -43,11 +43,7 @@ Eigen::VectorXd RobotDescription::effort_limits() const {
 }
 
 Eigen::VectorXd RobotDescription::ToPhysical(const Eigen::VectorXd& coordinates) const {
-  Eigen::VectorXd physical(coordinates.size());
-  for (Eigen::Index i = 0; i < coordinates.size(); ++i) {
-    physical(i) = parameters[static_cast<size_t>(i)].ToPhysical(coordinates(i));
-  }
-  return physical;
+  return plumb::ToPhysical(parameters, coordinates);
 }
 
 int RobotDescription::FindParameter(const std::string& parameter) const {

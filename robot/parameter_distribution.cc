@@ -116,11 +116,7 @@ Eigen::VectorXd ParameterDistribution::Sample(Random& random) const {
 }
 
 Eigen::VectorXd ParameterDistribution::ToPhysical(const Eigen::VectorXd& coordinates) const {
-  Eigen::VectorXd physical(coordinates.size());
-  for (Eigen::Index i = 0; i < physical.size(); ++i) {
-    physical[i] = parameters[static_cast<size_t>(i)].ToPhysical(coordinates[i]);
-  }
-  return physical;
+  return plumb::ToPhysical(parameters, coordinates);
 }
 
 Eigen::VectorXd ParameterDistribution::Mean() const {

@@ -144,4 +144,13 @@ double ParameterDescription::ToCoordinate(double value) const {
   }
 }
 
+Eigen::VectorXd ToPhysical(const std::vector<ParameterDescription>& parameters,
+                           const Eigen::VectorXd& coordinates) {
+  Eigen::VectorXd physical(coordinates.size());
+  for (Eigen::Index i = 0; i < physical.size(); ++i) {
+    physical[i] = parameters[static_cast<size_t>(i)].ToPhysical(coordinates[i]);
+  }
+  return physical;
+}
+
 }  // namespace plumb

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <limits>
 #include <string>
 #include <vector>
@@ -29,6 +30,11 @@ struct ParameterDescription {
   double ToPhysical(double coordinate_value) const;
   double ToCoordinate(double physical_value) const;
 };
+
+/// The parameters' coordinates -> physical units: one value per parameter, in their order.
+/// Thread-safe.
+Eigen::VectorXd ToPhysical(const std::vector<ParameterDescription>& parameters,
+                           const Eigen::VectorXd& coordinates);
 
 /// Whether a parameter of that name is what is at `path`, or one number for it and others: `name`
 /// may have the wildcards of fnmatch(3), of which none stands for a slash. Thread-safe.

@@ -82,7 +82,8 @@ class CheckpointReader {
   template <class Message>
   void EncodedMessage(Message& message) {
     const size_t size = Count(1);
-    if (message.decode(Take(size), 0, static_cast<int>(size)) != static_cast<int>(size)) {
+    const auto* const bytes = reinterpret_cast<const uint8_t*>(Take(size));
+    if (!Decode({bytes, size}, message)) {
       throw CheckpointError("holds a message that cannot be decoded");
     }
   }

@@ -11,7 +11,7 @@ namespace plumb {
 namespace {
 
 // ln N(x; p) of every column.
-Eigen::VectorXd ComponentLogDensities(const Gaussian& p, const Eigen::MatrixXd& points) {
+Eigen::VectorXd LogDensitiesOf(const Gaussian& p, const Eigen::MatrixXd& points) {
   const Eigen::LLT<Eigen::MatrixXd> factor(p.covariance);
   if (factor.info() != Eigen::Success)
     throw std::invalid_argument("covariance is not positive definite");
@@ -21,26 +21,6 @@ Eigen::VectorXd ComponentLogDensities(const Gaussian& p, const Eigen::MatrixXd& 
   const Eigen::MatrixXd inverse_root = factor.matrixL().solve(Eigen::MatrixXd::Identity(n, n));
   const Eigen::MatrixXd whitened = inverse_root * (points.colwise() - p.mean);
   return -0.5 * whitened.colwise().squaredNorm().transpose().array() - log_normaliser;
-}
-
-// N x K: ln(w_k N(x_i; k)).
-Eigen::MatrixXd WeightedLogDensities(const GaussianMixture& mixture,
-                                     const Eigen::MatrixXd& points) {
-  Eigen::MatrixXd result(points.cols(), static_cast<Eigen::Index>(mixture.components.size()));
-  for (size_t k = 0; k < mixture.components.size(); ++k) {
-    result.col(static_cast<Eigen::Index>(k)) =
-        ComponentLogDensities(mixture.components[k], points).array() + std::log(mixture.weights[k]);
-  }
-  return result;
-}
-
-// ln sum_k exp of every row; the rows become exp(row - that): responsibilities.
-Eigen::VectorXd NormaliseRows(Eigen::MatrixXd& log_densities) {
-  const Eigen::VectorXd largest = log_densities.rowwise().maxCoeff();
-  for (auto column : log_densities.colwise()) column = (column - largest).array().exp();
-  const Eigen::VectorXd sum = log_densities.rowwise().sum();
-  for (auto column : log_densities.colwise()) column.array() /= sum.array();
-  return largest.array() + sum.array().log();
 }
 
 // Index of a column drawn in proportion to the entries >= 0 of `weights`.
@@ -109,9 +89,23 @@ GaussianMixture Maximise(const Eigen::MatrixXd& samples, const Eigen::VectorXd& 
 
 }  // namespace
 
+Eigen::MatrixXd ComponentLogDensities(const GaussianMixture& mixture,
+                                      const Eigen::MatrixXd& points) {
+  Eigen::MatrixXd result(points.cols(), static_cast<Eigen::Index>(mixture.components.size()));
+  for (size_t k = 0; k < mixture.components.size(); ++k) {
+    result.col(static_cast<Eigen::Index>(k)) =
+        LogDensitiesOf(mixture.components[k], points).array() + std::log(mixture.weights[k]);
+  }
+  return result;
+}
+
+Eigen::VectorXd LogSumExp(const Eigen::MatrixXd& rows) {
+  const Eigen::VectorXd top = rows.rowwise().maxCoeff();
+  return top.array() + (rows.colwise() - top).array().exp().rowwise().sum().log();
+}
+
 Eigen::VectorXd LogDensities(const GaussianMixture& mixture, const Eigen::MatrixXd& points) {
-  Eigen::MatrixXd log_densities = WeightedLogDensities(mixture, points);
-  return NormaliseRows(log_densities);
+  return LogSumExp(ComponentLogDensities(mixture, points));
 }
 
 double LogDensity(const GaussianMixture& mixture, const Eigen::VectorXd& x) {
@@ -207,8 +201,10 @@ MixtureFit FitMixture(const Eigen::MatrixXd& samples, const Eigen::VectorXd& wei
     return FitMixture(samples, weights, 1, random, options);
   }
   for (int iteration = 0;; ++iteration) {
-    responsibilities = WeightedLogDensities(fit.mixture, samples);
-    fit.log_likelihood.push_back(w.dot(NormaliseRows(responsibilities)));
+    const Eigen::MatrixXd joint = ComponentLogDensities(fit.mixture, samples);
+    const Eigen::VectorXd evidence = LogSumExp(joint);
+    responsibilities = (joint.colwise() - evidence).array().exp();
+    fit.log_likelihood.push_back(w.dot(evidence));
     const size_t steps = fit.log_likelihood.size();
     const bool converged =
         steps > 1 &&

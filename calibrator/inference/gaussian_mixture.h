@@ -10,8 +10,15 @@ namespace plumb {
 
 // The functions here share nothing but a Random that is given: thread-safe apart from that.
 
-/// ln p(x) of every column of `points`. @throws std::invalid_argument if a covariance is not
-/// positive definite.
+/// ln(w_k N(x; m_k, S_k)) of every column of `points` (N) and every component: N x K. @throws
+/// std::invalid_argument if a covariance is not positive definite.
+Eigen::MatrixXd ComponentLogDensities(const GaussianMixture& mixture,
+                                      const Eigen::MatrixXd& points);
+
+/// ln of the sum of every row's exponentials, without overflow.
+Eigen::VectorXd LogSumExp(const Eigen::MatrixXd& rows);
+
+/// ln p(x) of every column of `points`: the LogSumExp of its components.
 Eigen::VectorXd LogDensities(const GaussianMixture& mixture, const Eigen::MatrixXd& points);
 double LogDensity(const GaussianMixture& mixture, const Eigen::VectorXd& x);
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calibrator/inference/common_axes.h"
+#include "calibrator/inference/gaussian_mixture.h"
 #include "common/decompositions.h"
 
 namespace plumb {
@@ -50,38 +51,12 @@ GaussianMixture Proposal(const GaussianMixture& mixture, double doubt, double wi
   return proposal;
 }
 
-// ln p of each component, N x K.
-Eigen::MatrixXd ComponentDensities(const GaussianMixture& mixture, const Eigen::MatrixXd& x) {
-  Eigen::MatrixXd densities(x.cols(), static_cast<Eigen::Index>(mixture.components.size()));
-  for (size_t k = 0; k < mixture.components.size(); ++k) {
-    const Gaussian& p = mixture.components[k];
-    const Eigen::LLT<Eigen::MatrixXd> factor(p.covariance);
-    const double constant = -0.5 * static_cast<double>(x.rows()) * std::log(2 * M_PI) -
-                            factor.matrixLLT().diagonal().array().log().sum();
-    const Eigen::MatrixXd white = factor.matrixL().solve(x.colwise() - p.mean);
-    densities.col(static_cast<Eigen::Index>(k)) =
-        constant - 0.5 * white.colwise().squaredNorm().array();
-  }
-  return densities;
-}
-
-Eigen::VectorXd LogSumExp(const Eigen::MatrixXd& rows) {
-  const Eigen::VectorXd top = rows.rowwise().maxCoeff();
-  return top.array() + (rows.colwise() - top).array().exp().rowwise().sum().log();
-}
-
-Eigen::MatrixXd Weighted(const GaussianMixture& mixture, Eigen::MatrixXd densities) {
-  for (Eigen::Index k = 0; k < densities.cols(); ++k)
-    densities.col(k).array() += std::log(mixture.weights[static_cast<size_t>(k)]);
-  return densities;
-}
-
 // One step of expectation-maximisation on weighted samples. @param narrower whether a component may
 // become so. @param widest that one may become, if that is given.
 GaussianMixture Adapt(const GaussianMixture& mixture, const Eigen::MatrixXd& x,
                       const Eigen::VectorXd& weights, bool narrower,
                       const Eigen::MatrixXd& widest) {
-  const Eigen::MatrixXd joint = Weighted(mixture, ComponentDensities(mixture, x));
+  const Eigen::MatrixXd joint = ComponentLogDensities(mixture, x);
   const Eigen::MatrixXd share = (joint.colwise() - LogSumExp(joint)).array().exp();
   const Eigen::Index n = x.rows();
   GaussianMixture adapted;
@@ -165,8 +140,7 @@ ImportanceFit FitByImportance(
     target.tail(density.size()) = density;
     Eigen::MatrixXd proposed(fit.samples.cols(), static_cast<Eigen::Index>(proposals.size()));
     for (size_t p = 0; p < proposals.size(); ++p) {
-      proposed.col(static_cast<Eigen::Index>(p)) =
-          LogSumExp(Weighted(proposals[p], ComponentDensities(proposals[p], fit.samples)));
+      proposed.col(static_cast<Eigen::Index>(p)) = LogDensities(proposals[p], fit.samples);
     }
     const Eigen::VectorXd log_weights = target - LogSumExp(proposed);
     fit.weights = Normalised(log_weights);

@@ -39,10 +39,11 @@ void Driver::PrepareMessages() {
     status_.joint_state[i] = driver_status_t::IDLE;
     status_.joint_reason[i] = "nothing measures it: left to the estimator";
   }
-  for (auto* values :
-       {&status_.motor_temperature, &status_.drive_temperature, &status_.bus_voltage}) {
+  for (auto* values : {&status_.motor_temperature, &status_.drive_temperature, &status_.bus_voltage,
+                       &status_.bus_current}) {
     values->assign(size, kNaN);
   }
+  status_.drive_identity.resize(size);
   status_.num_sensors = static_cast<int32_t>(sensors_.size());
   for (const JointSensor& sensor : sensors_) status_.sensor_name.push_back(sensor.name());
   status_.sensor_state.resize(sensors_.size());
@@ -136,6 +137,7 @@ driver_status_t& Driver::Status(int64_t utime, std::span<const TransportStats> s
     bus.frames_dropped = counted.refused + counted.lost;
     bus.frames_foreign = counted.foreign;
   }
+  status_.setpoints_saturated = 0;
   for (size_t k = joints_.size(); k-- > 0;) {
     const Motor& motor = *joints_[k].motor;
     const size_t i = joints_[k].index;
@@ -146,6 +148,9 @@ driver_status_t& Driver::Status(int64_t utime, std::span<const TransportStats> s
     status_.motor_temperature[i] = readings.motor_temperature;
     status_.drive_temperature[i] = readings.drive_temperature;
     status_.bus_voltage[i] = readings.bus_voltage;
+    status_.bus_current[i] = readings.bus_current;
+    status_.drive_identity[i] = motor.identity();
+    status_.setpoints_saturated += motor.saturations();
     if (status_.state == driver_status_t::ABSENT && motor.state() == DriveState::kAbsent) {
       Reason absent;
       absent.Set("{}: {}", joints_[k].name, status_.joint_reason[i]);

@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "robot/rotation_vector.h"
+
 namespace plumb {
 namespace {
 
@@ -52,19 +54,6 @@ Eigen::VectorXd StateScale(const RobotDescription& description) {
 }
 
 Eigen::Quaterniond Quaternion(const double* wxyz) { return {wxyz[0], wxyz[1], wxyz[2], wxyz[3]}; }
-
-/// The shortest of the rotation vectors of a quaternion, which need not be normalised.
-Eigen::Vector3d RotationVector(const Eigen::Quaterniond& q) {
-  const double sine = q.vec().norm(), cosine = std::abs(q.w());
-  const double factor = sine > 0 ? 2 * std::atan2(sine, cosine) / sine : 0;
-  return std::copysign(factor, q.w()) * q.vec();
-}
-
-Eigen::Quaterniond Rotation(const Eigen::Vector3d& vector) {
-  const double angle = vector.norm();
-  if (!(angle > 0)) return Eigen::Quaterniond::Identity();
-  return Eigen::Quaterniond(Eigen::AngleAxisd(angle, vector / angle));
-}
 
 /// Any orientation, all as likely: Shoemake, "Uniform random rotations", Graphics Gems III, 1992.
 Eigen::Quaterniond AnyOrientation(Random& random) {
@@ -116,7 +105,7 @@ ReachTask::ReachTask(const RobotDescription& description, const std::string& nam
 }
 
 Eigen::Vector3d ReachTask::Turn(const Joint& joint, const State& q) {
-  return RotationVector(joint.orientation.conjugate() * Quaternion(q.data() + joint.q));
+  return ToRotationVector(joint.orientation.conjugate() * Quaternion(q.data() + joint.q));
 }
 
 double ReachTask::Distance(size_t index, const State& q) const {
@@ -178,7 +167,7 @@ void ReachTask::InitialState(Random& random, Eigen::Ref<Eigen::VectorXd> q,
     } else {
       Eigen::Vector3d turn;
       for (double& entry : turn) entry = random.Uniform(joint.lower, joint.upper);
-      start = joint.orientation * Rotation(turn);
+      start = joint.orientation * FromRotationVector(turn);
     }
     q.segment<4>(joint.q) << start.w(), start.x(), start.y(), start.z();
   }

@@ -10,6 +10,7 @@
 #include "chaos/little_robot.h"
 #include "common/identity.h"
 #include "common/lockstep/participant.h"
+#include "common/message_bytes.h"
 #include "plumb/controller_status_t.hpp"
 #include "plumb/driver_status_t.hpp"
 #include "plumb/policy_t.hpp"
@@ -53,9 +54,8 @@ struct Told {
     lockstep_post_t post;
     post.topic = ChannelTopic(channel);
     post.arrival = driver.Now();
-    const int size = message.getEncodedSize();
-    post.data.resize(static_cast<size_t>(size) + kSealSize);
-    message.encode(post.data.data(), 0, size);
+    post.data = Encode(message);
+    post.data.resize(post.data.size() + kSealSize);
     driver.Seal(channel, post.data);
     post.size = static_cast<int32_t>(post.data.size());
     witness.OnHeard(post);
@@ -100,8 +100,7 @@ TEST_CASE("a distribution that was said rests on a journal") {
   post.topic = ChannelTopic("PARAMETER_DISTRIBUTION");
   parameter_distribution_t distribution{};
   distribution.iteration = 1;
-  post.data.resize(static_cast<size_t>(distribution.getEncodedSize()));
-  distribution.encode(post.data.data(), 0, static_cast<int>(post.data.size()));
+  post.data = Encode(distribution);
   told.said.OnSaid(1, post, "plumb-calibrator");
   told.witness.Judge(1, told.folder.path(), kSeed, told.said);
   CHECK(told.chronicle.invariant() == 4);

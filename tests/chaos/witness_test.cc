@@ -7,6 +7,7 @@
 #include "chaos/message_witness.h"
 #include "chaos/torque_witness.h"
 #include "common/lockstep/participant.h"
+#include "common/message_bytes.h"
 #include "drivers/protocols/cansimple.h"
 #include "plumb/driver_request_t.hpp"
 #include "plumb/driver_status_t.hpp"
@@ -28,9 +29,8 @@ lockstep_post_t Post(const std::string& channel, const Message& message, int64_t
   lockstep_post_t post;
   post.topic = ChannelTopic(channel);
   post.arrival = arrival;
-  post.data.resize(static_cast<size_t>(message.getEncodedSize()));
+  post.data = Encode(message);
   post.size = static_cast<int32_t>(post.data.size());
-  message.encode(post.data.data(), 0, post.size);
   return post;
 }
 

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <fstream>
 
+#include "common/message_bytes.h"
 #include "common/random.h"
 #include "plumb/joint_state_t.hpp"
 #include "plumb/parameter_distribution_t.hpp"
@@ -61,8 +62,7 @@ TEST_CASE("hostile messages are rejected, counted, and cost no memory") {
   m.num_parameters = 2, m.name = {"gravity", "mass"}, m.coordinate = {0, 1};
   m.num_components = 1, m.weight = {1}, m.num_means = 2, m.mean = {1, 2};
   m.num_covariances = 4, m.covariance = {1, 0, 0, 1};
-  std::vector<uint8_t> good(static_cast<size_t>(m.getEncodedSize()));
-  m.encode(good.data(), 0, static_cast<int>(good.size()));
+  const std::vector<uint8_t> good = Encode(m);
   Random random(1);
   int sent = 0;
   const auto send = [&](const std::vector<uint8_t>& bytes) {
@@ -103,8 +103,7 @@ TEST_CASE("a message that does not decode leaves the newest good one alone") {
   Subscriber<joint_state_t> subscriber(messenger, "X");
   Publisher<joint_state_t> publisher(messenger, "X");
   publisher.Publish(Message(7));
-  std::vector<uint8_t> cut(static_cast<size_t>(Message(8).getEncodedSize()));
-  Message(8).encode(cut.data(), 0, static_cast<int>(cut.size()));
+  const std::vector<uint8_t> cut = Encode(Message(8));
   messenger.Publish("X", std::span(cut).first(cut.size() - 3));
   messenger.Drain();
   REQUIRE(subscriber.received() + subscriber.rejected() == 2);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/identity.h"
+#include "common/message_bytes.h"
 #include "plumb/joint_command_t.hpp"
 
 namespace plumb {
@@ -22,9 +23,7 @@ inline Bytes Encoded(double effort = 0.5) {
   command.num_joints = 1;
   command.effort = {effort};
   command.position = command.velocity = command.kp = command.kd = {0};
-  Bytes bytes(static_cast<size_t>(command.getEncodedSize()));
-  command.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return bytes;
+  return Encode(command);
 }
 
 inline Bytes Say(Identity& who, std::string_view channel = kChannel) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "common/message_bytes.h"
 #include "controller/policy.h"
 #include "plumb/calibration_status_t.hpp"
 #include "plumb/joint_state_t.hpp"
@@ -23,9 +24,7 @@ struct Forger {
   explicit Forger(Messenger& m) : messenger(m) {}
   template <class Message>
   void Say(const std::string& channel, const Message& message) {
-    std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
-    message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-    messenger.Publish(channel, bytes);
+    messenger.Publish(channel, Encode(message));
   }
   void JointState(double effort) {
     joint_state_t m{};

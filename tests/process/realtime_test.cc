@@ -10,6 +10,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
+#include "common/message_bytes.h"
 #include "common/process_number.h"
 #include "common/random.h"
 #include "plumb/parameter_distribution_t.hpp"
@@ -136,8 +137,7 @@ TEST_CASE("garbage datagrams on the udp bus and on LCM") {
   }
   // A message with the right fingerprint and a hostile count: plain lcm-cpp subscribers die of it.
   joint_command_t hostile{};
-  std::vector<uint8_t> message(static_cast<size_t>(hostile.getEncodedSize()));
-  hostile.encode(message.data(), 0, static_cast<int>(message.size()));
+  std::vector<uint8_t> message = Encode(hostile);
   for (const uint32_t count : {0xffffffffu, 0x7fffffffu, 1u << 27}) {
     const uint32_t network = htonl(count);
     std::memcpy(message.data() + 8 + 8 + 8 + 8 + 8 + 4 + 4, &network, 4);

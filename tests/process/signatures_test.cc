@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/message_bytes.h"
 #include "tests/process/stage.h"
 
 namespace plumb {
@@ -53,9 +54,8 @@ struct Stranger {
   }
   template <class Message>
   void Say(const std::string& channel, const Message& message) {
-    const auto size = static_cast<size_t>(message.getEncodedSize());
-    std::vector<uint8_t> bytes(size + kSealSize);
-    message.encode(bytes.data(), 0, static_cast<int>(size));
+    std::vector<uint8_t> bytes = Encode(message);
+    bytes.resize(bytes.size() + kSealSize);
     Seal seal = seen[channel];
     seal.counter = stage.Now();
     WriteSeal(seal, nullptr, "", "", "", bytes);  // its signature, too

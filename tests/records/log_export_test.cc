@@ -9,6 +9,7 @@
 
 #include "common/config.h"
 #include "common/lcm_log_writer.h"
+#include "common/message_bytes.h"
 #include "common/seal.h"
 #include "plumb/driver_status_t.hpp"
 #include "plumb/parameter_distribution_t.hpp"
@@ -24,8 +25,7 @@ constexpr int64_t kBegin = 1'700'000'000'000'000;
 
 template <class Message>
 std::vector<uint8_t> Sealed(const Message& message) {
-  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  std::vector<uint8_t> bytes = Encode(message);
   bytes.resize(bytes.size() + kSealSize);
   WriteSeal({1, 2, 3, 4, {}}, nullptr, "", "", "", bytes);
   return bytes;

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "common/config.h"
+#include "common/message_bytes.h"
 #include "common/message_type.h"
 #include "records/message_definitions.h"
 #include "robot/parameter_distribution.h"
@@ -89,11 +90,7 @@ TEST_CASE("the newest distribution of the parameters is kept, and nothing that i
   RecordFolder record(log, {"plumb 1", "", "", "real", ""});
   parameter_distribution_t message =
       ParameterDistribution::Prior(LoadRobot(Robots() + "pendulum")).ToMessage();
-  const auto say = [&](const std::string& channel) {
-    std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
-    message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-    record.Hear(channel, bytes);
-  };
+  const auto say = [&](const std::string& channel) { record.Hear(channel, Encode(message)); };
   say("ROBOT_STATE");
   CHECK_FALSE(fs::exists(file));
   record.Hear("PARAMETER_DISTRIBUTION", std::vector<uint8_t>(100));

@@ -95,6 +95,8 @@ export interface driver_status_t {
   motor_temperature: (number | null)[];
   drive_temperature: (number | null)[];
   bus_voltage: (number | null)[];
+  bus_current: (number | null)[];
+  drive_identity: string[];
   num_sensors: number;
   sensor_name: string[];
   sensor_state: number[];
@@ -104,6 +106,7 @@ export interface driver_status_t {
   commands_rejected: number;
   commands_expired: number;
   commands_limited: number;
+  setpoints_saturated: number;
   commands_signed: boolean;
   commands_forged: number;
   messages_rejected: number;

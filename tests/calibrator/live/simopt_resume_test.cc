@@ -16,6 +16,7 @@
 #include "calibrator/results/posterior_file.h"
 #include "common/checked_file.h"
 #include "common/config.h"
+#include "common/message_bytes.h"
 #include "robot/parameter_distribution.h"
 #include "robot/posterior_reader.h"
 #include "tests/calibrator/live/known_pendulum.h"
@@ -261,9 +262,7 @@ TEST_CASE("what the simulators lack is told to the trainer again after a resumpt
   state.residual = std::make_shared<const Residual>(residual);
   const auto told = [&](const SimOpt::State& of) {
     const parameter_distribution_t message = DistributionMessage(robot, of, 1, nullptr);
-    std::vector<char> bytes(static_cast<size_t>(message.getEncodedSize()));
-    message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-    return bytes;
+    return Encode(message);
   };
   const TemporaryFolder folder;
   CalibrationCheckpoint checkpoint(folder.path(), robot, 1);

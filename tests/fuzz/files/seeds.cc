@@ -13,6 +13,7 @@
 #include "calibrator/live/checkpoint.h"
 #include "common/config.h"
 #include "common/lcm_log_writer.h"
+#include "common/message_bytes.h"
 #include "common/time_units.h"
 #include "controller/policy.h"
 #include "plumb/controller_status_t.hpp"
@@ -32,13 +33,6 @@ constexpr int64_t kEpisode = 1'700'000'000'000'000;  // [us]
 constexpr int kSteps = 2;
 constexpr size_t kLongest = 16384;  // that scripts/fuzz tries: libFuzzer cuts what is longer
 
-template <class Message>
-std::vector<uint8_t> Bytes(const Message& message) {
-  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return bytes;
-}
-
 // Without its head, which the fuzzer makes anew.
 std::string Content(std::string_view file) {
   return std::string(CheckedContent(KindOf(file), file));
@@ -56,7 +50,7 @@ void Write(const fs::path& file, std::string_view content) {
 // A message for message_fuzz: its number there, and what is behind its fingerprint.
 template <class Message>
 void WriteMessage(const fs::path& file, char number, const Message& message) {
-  const std::vector<uint8_t> bytes = Bytes(message);
+  const std::vector<uint8_t> bytes = Encode(message);
   Write(file, number + std::string(bytes.begin() + 8, bytes.end()));
 }
 
@@ -147,7 +141,7 @@ void WriteLog(const RobotDescription& robot, const fs::path& file) {
     state.q.assign(n, 0.001 * i), state.v.assign(n, 0.2), state.effort.assign(n, 0.5);
     state.q_sd.assign(n, 1e-4), state.v_sd.assign(n, 1e-2);
     state.valid = true;
-    log.Write(time, "ROBOT_STATE_SMOOTHED", Bytes(state));
+    log.Write(time, "ROBOT_STATE_SMOOTHED", Encode(state));
     if (i % states != 0 || i == kSteps * states) continue;
     joint_command_t command{};
     command.utime = time, command.sequence = command.step = i / states;
@@ -157,7 +151,7 @@ void WriteLog(const RobotDescription& robot, const fs::path& file) {
     command.effort.assign(n, 0.5);
     for (auto* targets : {&command.position, &command.velocity, &command.kp, &command.kd})
       targets->assign(n, std::numeric_limits<double>::quiet_NaN());
-    log.Write(time, "JOINT_COMMAND", Bytes(command));
+    log.Write(time, "JOINT_COMMAND", Encode(command));
   }
   controller_status_t status{};
   status.phase = controller_status_t::COMPLETE;
@@ -167,7 +161,7 @@ void WriteLog(const RobotDescription& robot, const fs::path& file) {
   status.returns = status.late_rate = {-1};
   status.steps = {kSteps};
   status.fell = {0};
-  log.Write(kEpisode + kSteps * states * period, "CONTROLLER_STATUS", Bytes(status));
+  log.Write(kEpisode + kSteps * states * period, "CONTROLLER_STATUS", Encode(status));
   log.Flush();
 }
 

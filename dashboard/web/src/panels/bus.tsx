@@ -7,7 +7,7 @@ import { driver, estimator } from "../run";
 const COUNTERS: Names<driver_status_t> = [
   ["cycles", "cycles"], ["missed deadlines", "overruns", "bad"], ["measurements lost", "measurements_lost", "bad"], ["commands accepted", "commands_accepted"],
   ["commands rejected", "commands_rejected", "bad"], ["commands expired", "commands_expired"], ["commands limited", "commands_limited"], ["commands forged", "commands_forged", "bad"],
-  ["messages rejected", "messages_rejected", "bad"],
+  ["setpoints saturated", "setpoints_saturated", "bad"], ["messages rejected", "messages_rejected", "bad"],
 ];
 
 const FRAMES: Names<bus_status_t> = [
@@ -30,8 +30,8 @@ export function BusPanel() {
           ))}
           {d.commands_signed && <p class="line">Only commands that are signed with its key are obeyed.</p>}
           <Counters channel="DRIVER_STATUS" message={d} names={COUNTERS} />
-          <Table shown caption="Drives" columns={["joint", "drive", "motor [°C]", "power stage [°C]", "supply [V]", "says"]}
-            rows={d.joint_name.map((name, i) => [name, DRIVER_STATES[d.joint_state[i] ?? 0] ?? "", d.motor_temperature[i], d.drive_temperature[i], d.bus_voltage[i], d.joint_reason[i]])} />
+          <Table shown caption="Drives" columns={["joint", "drive", "motor [°C]", "power stage [°C]", "supply [V]", "supply [A]", "firmware", "says"]}
+            rows={d.joint_name.map((name, i) => [name, DRIVER_STATES[d.joint_state[i] ?? 0] ?? "", d.motor_temperature[i], d.drive_temperature[i], d.bus_voltage[i], d.bus_current[i], d.drive_identity[i], d.joint_reason[i]])} />
           {d.num_sensors > 0 && (
             <Table shown caption="Sensors" columns={["sensor", "state", "says"]} rows={d.sensor_name.map((name, i) => [name, ["absent", "starting", "running", "fault"][d.sensor_state[i] ?? 0] ?? "", d.sensor_reason[i]])} />
           )}
