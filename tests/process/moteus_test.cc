@@ -68,7 +68,6 @@ TEST_CASE("a pendulum on a moteus: a command and an answer in every cycle") {
   const driver_status_t& status = stage.drivers.newest();
   CHECK(status.bus_voltage[0] == 24);
   CHECK_THAT(status.drive_identity[0], Contains("moteus, firmware"));
-  CHECK_THAT(status.drive_identity[0], StartsWith("moteus, firmware "));
   CHECK(status.drive_temperature[0] == 25);
   CHECK(status.buses[0].frames_rejected == 0);
   CHECK(joints.newest().effort_measured[0] == Approx(witness.given).margin(1e-6));
