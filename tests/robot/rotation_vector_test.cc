@@ -14,7 +14,7 @@ TEST_CASE("a rotation vector turns about itself, by its length") {
   const Vector3d axis = Vector3d(2, -3, 6) / 7;
   const Quaterniond turn = FromRotationVector(angle * axis);
   CHECK(turn.norm() == Approx(1).epsilon(1e-15));
-  CHECK(turn.w() == Approx(std::cos(angle / 2)).epsilon(1e-15));
+  CHECK(turn.w() == Approx(std::cos(angle / 2)).epsilon(0).margin(1e-15));
   const Vector3d expected = std::sin(angle / 2) * axis;
   CHECK((turn.vec() - expected).norm() <= 1e-15 * expected.norm());
 }
@@ -27,9 +27,12 @@ TEST_CASE("the vector of a rotation is the shortest, of either of its quaternion
   turn.coeffs() *= length;
   const Vector3d vector = ToRotationVector(turn);
   // At half a turn both ways are the shortest.
-  const double sign = angle < 3.1 ? 1 : std::copysign(1, vector.x());
-  CHECK((vector - sign * angle * axis).norm() <= 1e-14 * angle);
-  CHECK((ToRotationVector(FromRotationVector(vector)) - vector).norm() <= 1e-14 * angle);
+  const auto is = [&](const Vector3d& one) {
+    const double sign = angle < 3.1 ? 1 : std::copysign(1, one.x());
+    return (one - sign * angle * axis).norm() <= 1e-14 * angle;
+  };
+  CHECK(is(vector));
+  CHECK(is(ToRotationVector(FromRotationVector(vector))));
 }
 
 TEST_CASE("no rotation has no vector, and what is no number stays none") {
