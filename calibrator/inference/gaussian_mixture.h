@@ -15,10 +15,11 @@ namespace plumb {
 Eigen::MatrixXd ComponentLogDensities(const GaussianMixture& mixture,
                                       const Eigen::MatrixXd& points);
 
-/// ln of the sum of every row's exponentials, without overflow.
+/// ln of the sum of every row's exponentials, without overflow; NaN of a row of -infinity alone.
 Eigen::VectorXd LogSumExp(const Eigen::MatrixXd& rows);
 
-/// ln p(x) of every column of `points`: the LogSumExp of its components.
+/// ln p(x) of every column of `points`: the LogSumExp of its components. @throws
+/// std::invalid_argument as they do.
 Eigen::VectorXd LogDensities(const GaussianMixture& mixture, const Eigen::MatrixXd& points);
 double LogDensity(const GaussianMixture& mixture, const Eigen::VectorXd& x);
 

@@ -8,7 +8,6 @@
 
 #include "calibrator/inference/common_axes.h"
 #include "calibrator/inference/gaussian_mixture.h"
-#include "common/decompositions.h"
 
 namespace plumb {
 namespace {

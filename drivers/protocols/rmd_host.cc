@@ -78,7 +78,8 @@ class RmdMotor : public AnsweringMotor<Step> {
   Frame Torque(double torque) noexcept override {
     if (step() != Step::kArmed) torque = 0;
     double current = torque / torque_constant_;
-    if (!(std::abs(current) <= most_current_)) CountSaturation();
+    // Less than a code is lost in rounding, not to the range.
+    if (!(std::abs(current) < most_current_ + kTorque.fields[1].scale)) CountSaturation();
     if (!std::isfinite(current)) current = 0;
     return MakeCommand(kTorque, node_, std::clamp(current, -most_current_, most_current_));
   }

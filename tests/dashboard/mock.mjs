@@ -62,7 +62,7 @@ const controller = (policy_iteration, phase = 3, purpose = 0) => ({ utime: BEGIN
 const zeros = Array(20).fill(0);
 const bus = (cycles) => ({ name: "", url: "socketcan:can0", up: true, frames_received: cycles * 2, frames_sent: cycles, frames_rejected: 0, frames_dropped: 0, frames_foreign: 0 });
 const driver = (state, reason, cycles) => ({
-  utime: BEGIN, state, reason, robot: "pendulum", bus: "socketcan:can0", num_buses: 1, buses: [bus(cycles)], joint_name: ["pivot"], joint_state: [state], joint_reason: [""], motor_temperature: [31.5], drive_temperature: [28], bus_voltage: [null], bus_current: [null], drive_identity: [""], num_sensors: 0, sensor_name: [], sensor_state: [], sensor_reason: [],
+  utime: BEGIN, state, reason, robot: "pendulum", bus: "socketcan:can0", num_buses: 1, buses: [bus(cycles)], joint_name: ["pivot"], joint_state: [state], joint_reason: [""], motor_temperature: [31.5], drive_temperature: [28], bus_voltage: [null], bus_current: [null], drive_identity: ["firmware 0.6.10"], num_sensors: 0, sensor_name: [], sensor_state: [], sensor_reason: [],
   measurements_lost: 1, commands_accepted: Math.floor(cycles / 10), commands_rejected: 0, commands_expired: 0, commands_limited: 12, setpoints_saturated: 0, commands_signed: false, commands_forged: 0, messages_rejected: 0, cycles, overruns: 3, num_bins: 20,
   lateness: zeros.map((_, i) => Math.round(cycles * 0.4 * Math.exp(-((i - 4) ** 2) / 3))).map((one, i) => (i === 13 ? 3 : one)), phase_name: ["receive", "publish", "command", "control", "send"],
   phase_duration: [2, 3, 1, 4, 5].flatMap((middle) => zeros.map((_, i) => Math.round(cycles * 0.5 * Math.exp(-((i - middle) ** 2) / 2)))),

@@ -73,7 +73,7 @@ TEST_CASE("a pendulum on an RMD motor: two questions and two answers in every cy
   CHECK(std::abs(witness.asked) <= 2 / 0.9 + 0.005);
   const driver_status_t& status = stage.drivers.newest();
   CHECK(status.bus_voltage[0] == Approx(48));
-  CHECK_FALSE(status.drive_identity[0].empty());
+  CHECK(status.drive_identity[0] == "X8S2V10, software of 20220206");
   CHECK(status.motor_temperature[0] == 25);
   CHECK(status.buses[0].frames_rejected == 0);
   CHECK(joints.newest().effort_measured[0] == Approx(0.9 * witness.given).margin(0.01));

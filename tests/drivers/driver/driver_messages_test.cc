@@ -12,6 +12,7 @@ namespace plumb {
 namespace {
 
 using Catch::Matchers::Contains;
+using Catch::Matchers::StartsWith;
 
 constexpr double kTwoPi = 2 * std::numbers::pi;
 
@@ -195,6 +196,7 @@ TEST_CASE("temperatures and supplies are asked for, one at a time") {
   Rig rig(2);
   rig.Start();
   CHECK(std::isnan(rig.Status().motor_temperature[0]));
+  CHECK(std::isnan(rig.Status().bus_current[0]));
   REQUIRE(rig.Arm(1));
   std::map<std::string, int> asked;
   for (int i = 0; i < 200; ++i) {
@@ -213,7 +215,10 @@ TEST_CASE("temperatures and supplies are asked for, one at a time") {
     CHECK(rig.Status().motor_temperature[i] == 25);
     CHECK(rig.Status().drive_temperature[i] == 25);
     CHECK(rig.Status().bus_voltage[i] == 24);
+    CHECK(rig.Status().bus_current[i] == 0);
+    CHECK_THAT(rig.Status().drive_identity[i], StartsWith("firmware 0.6."));
   }
+  CHECK(rig.Status().setpoints_saturated == 0);
 }
 
 }  // namespace

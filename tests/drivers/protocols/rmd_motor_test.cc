@@ -111,6 +111,7 @@ TEST_CASE("an RMD motor gets finite torques within its current, and the others a
   CHECK(ToText(bench.motor->Torque(9)) == "151#A1000000E8030000");  // 10 A
   CHECK(ToText(bench.motor->Torque(-9)) == "151#A100000018FC0000");
   CHECK(ToText(bench.motor->Torque(18)) == "151#A1000000D0070000");
+  CHECK(ToText(bench.motor->Torque(18 * (1 + 1e-15))) == "151#A1000000D0070000");
   CHECK(bench.motor->saturations() == 0);
   CHECK(ToText(bench.motor->Torque(99)) == "151#A1000000D0070000");
   CHECK(ToText(bench.motor->Torque(-1e300)) == "151#A100000030F80000");

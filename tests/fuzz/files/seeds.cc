@@ -17,6 +17,7 @@
 #include "common/time_units.h"
 #include "controller/policy.h"
 #include "plumb/controller_status_t.hpp"
+#include "plumb/driver_status_t.hpp"
 #include "plumb/joint_command_t.hpp"
 #include "plumb/robot_state_t.hpp"
 #include "tests/calibrator/sample_findings.h"
@@ -161,7 +162,22 @@ void WriteLog(const RobotDescription& robot, const fs::path& file) {
   status.returns = status.late_rate = {-1};
   status.steps = {kSteps};
   status.fell = {0};
-  log.Write(kEpisode + kSteps * states * period, "CONTROLLER_STATUS", Encode(status));
+  const int64_t end = kEpisode + kSteps * states * period;
+  log.Write(end, "CONTROLLER_STATUS", Encode(status));
+  // Of other shapes: structures and texts in arrays, and an array of arrays.
+  driver_status_t driver{};
+  driver.utime = end, driver.robot = robot.name;
+  driver.num_buses = 1, driver.buses.resize(1);
+  driver.num_joints = joints, driver.joint_name.assign(n, "joint");
+  driver.joint_state.assign(n, driver_status_t::ARMED);
+  driver.joint_reason.resize(n), driver.drive_identity.assign(n, "firmware 0.6.10");
+  for (auto* readings : {&driver.motor_temperature, &driver.drive_temperature, &driver.bus_voltage,
+                         &driver.bus_current})
+    readings->assign(n, 24);
+  driver.num_bins = driver.num_phases = 2;
+  driver.lateness = {3, 1}, driver.phase_name = {"receive", "send"};
+  driver.phase_duration.assign(2, driver.lateness);
+  log.Write(end, "DRIVER_STATUS", Encode(driver));
   log.Flush();
 }
 

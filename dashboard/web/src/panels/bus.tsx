@@ -30,7 +30,7 @@ export function BusPanel() {
           ))}
           {d.commands_signed && <p class="line">Only commands that are signed with its key are obeyed.</p>}
           <Counters channel="DRIVER_STATUS" message={d} names={COUNTERS} />
-          <Table shown caption="Drives" columns={["joint", "drive", "motor [°C]", "power stage [°C]", "supply [V]", "supply [A]", "firmware", "says"]}
+          <Table shown caption="Drives" columns={["joint", "drive", "motor [°C]", "power stage [°C]", "supply [V]", "supply [A]", "calls itself", "says"]}
             rows={d.joint_name.map((name, i) => [name, DRIVER_STATES[d.joint_state[i] ?? 0] ?? "", d.motor_temperature[i], d.drive_temperature[i], d.bus_voltage[i], d.bus_current[i], d.drive_identity[i], d.joint_reason[i]])} />
           {d.num_sensors > 0 && (
             <Table shown caption="Sensors" columns={["sensor", "state", "says"]} rows={d.sensor_name.map((name, i) => [name, ["absent", "starting", "running", "fault"][d.sensor_state[i] ?? 0] ?? "", d.sensor_reason[i]])} />
