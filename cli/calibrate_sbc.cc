@@ -7,12 +7,14 @@
 #include <vector>
 
 #include "calibrator/diagnostics/robot_sbc.h"
+#include "calibrator/motion/differences.h"
 #include "calibrator/results/calibration.h"
 
 namespace plumb {
 
 int JudgePosteriors(const RobotDescription& robot, const std::vector<Log>& logs,
                     const CalibrationOptions& options, int runs, bool strict) {
+  RequireVelocities(robot, logs, "simulation-based calibration");
   CalibrationOptions for_noise = options;  // of which nothing else is needed
   for_noise.method = "laplace", for_noise.horizons = {1}, for_noise.residual = false;
   const Findings findings = Calibrate(robot, logs, for_noise);

@@ -1,10 +1,11 @@
 #include "cli/reading_noise.h"
 
-#include <Eigen/Geometry>
 #include <charconv>
 #include <cmath>
 #include <stdexcept>
 #include <string_view>
+
+#include "robot/configuration_space.h"
 
 namespace plumb {
 namespace {
@@ -21,20 +22,9 @@ double ParseSd(std::string_view text) {
 
 void ReadingNoise::Add(const RobotDescription& robot, Random& random, Eigen::VectorXd& q_read,
                        Eigen::VectorXd& v_read) const {
-  Eigen::Index i = 0;
-  for (const JointDescription& joint : robot.joints) {
-    if (joint.type == JointDescription::Type::kSpherical) {
-      Eigen::Vector3d turn;
-      for (double& angle : turn) angle = q * random.Normal();
-      const Eigen::Quaterniond turned =
-          Eigen::Quaterniond(q_read(i), q_read(i + 1), q_read(i + 2), q_read(i + 3)) *
-          Eigen::Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()));
-      q_read.segment<4>(i) << turned.w(), turned.vec();
-      i += 4;
-    } else {
-      q_read(i++) += q * random.Normal();
-    }
-  }
+  Eigen::VectorXd step(v_read.size());
+  for (double& entry : step) entry = q * random.Normal();
+  q_read = ConfigurationSpace(robot).Move(q_read, step);
   for (double& velocity : v_read) velocity += v * random.Normal();
 }
 

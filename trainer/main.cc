@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "common/atomic_file.h"
-#include "common/config.h"
 #include "common/examples.h"
 #include "common/hash.h"
 #include "common/name_lock.h"
@@ -39,11 +38,7 @@ struct Options {
 
 /// All that training depends on, but for what a session's checkpoint tells.
 uint64_t FingerprintOf(const RobotDescription& robot) {
-  std::vector<std::string> files;
-  Config::Load(robot.file, &files);
-  uint64_t fingerprint = Hash(VersionLine("plumb-trainer"), robot.fingerprint);
-  for (const std::string& file : files) fingerprint = Hash(ReadFile(file), fingerprint);
-  return fingerprint;
+  return Hash(VersionLine("plumb-trainer"), robot.fingerprint);
 }
 
 /// plumb-trainer: turns each PARAMETER_DISTRIBUTION into a POLICY, and chooses among them by what

@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "calibrator/diagnostics/identifiability.h"
+#include "calibrator/diagnostics/model_test.h"
+#include "calibrator/fit/estimated_noise.h"
 #include "calibrator/fit/one_step.h"
 #include "calibrator/fit/physical_columns.h"
 #include "calibrator/fit/recorded_window.h"
@@ -16,6 +18,8 @@
 #include "calibrator/fit/whitening.h"
 #include "calibrator/fit/window_errors.h"
 #include "calibrator/inference/laplace.h"
+#include "calibrator/motion/differences.h"
+#include "calibrator/motion/still_readings.h"
 #include "calibrator/results/summary.h"
 #include "common/time_units.h"
 #include "robot/parameter_distribution.h"
@@ -81,10 +85,14 @@ class RemoteErrors {
 
   bool noise_known() const { return own_.noise_known(); }
   const std::vector<WindowErrors::Row>& rows() const { return own_.rows(); }
-  const Eigen::VectorXd& noise_sd() const { return noise_sd_; }
-  void Scale(const Eigen::VectorXd& scale) {
-    for (Eigen::Index c = 0; c < std::min(scale.size(), noise_sd_.size()); ++c)
-      noise_sd_(c) *= std::max(scale(c), 1e-150);
+  void Scale(const LaplaceFit& fit) { noise_sd_ = ScaledNoise(noise_sd_, fit); }
+  /// What is left of a fit, with the noise by its errors.
+  OneStepView View(const LaplaceFit& fit) {
+    own_.set_noise_sd(noise_sd_);
+    OneStepView view;
+    view.fit = fit, view.rows = rows(), view.noise_known = noise_known();
+    view.noise_sd = EstimatedNoise(own_, fit);
+    return view;
   }
   int64_t evaluations() const { return evaluations_; }
 
@@ -127,14 +135,11 @@ class RemoteErrors {
       const auto count = static_cast<Eigen::Index>(end - begin);
       Eigen::VectorXd end_sd(count);
       for (Eigen::Index i = 0; i < count; ++i) {
-        const Eigen::Index c = coordinates[static_cast<size_t>(i)];
-        const double known = EndSd(t, c);
-        end_sd(i) = known > 0 ? known : noise_sd_(c);
+        end_sd(i) = EndSd(t, coordinates[static_cast<size_t>(i)], noise_sd_);
       }
-      Eigen::VectorXd start_sd = StartSd(t);
-      start_sd = start_sd.array().isNaN().select(noise_sd_, start_sd);
-      WhitenWindow(std::vector<Eigen::Index>{0, count}, start_sd, slopes(coordinates, Eigen::all),
-                   end_sd, errors->middleRows(static_cast<Eigen::Index>(begin), count));
+      WhitenWindow(std::vector<Eigen::Index>{0, count}, StartSd(t, noise_sd_),
+                   slopes(coordinates, Eigen::all), end_sd,
+                   errors->middleRows(static_cast<Eigen::Index>(begin), count));
     }
   }
 
@@ -165,7 +170,7 @@ LaplaceFit Fit(RemoteErrors& errors, const Prior& prior, const RemoteModel& mode
     mode = fit.mode;
     const bool settled = errors.noise_known() || (fit.scale.array().log().abs() < kSettled).all();
     if (settled || round == kNoiseRounds) return fit;
-    errors.Scale(fit.scale);
+    errors.Scale(fit);
   }
 }
 
@@ -180,7 +185,9 @@ Eigen::Index NextStatesSize(const RobotDescription& robot, std::span<const Log> 
 Findings CalibrateRemote(const RobotDescription& robot, std::span<const Log> logs,
                          RemoteModel& model, const CalibrationOptions& options) {
   const auto start = std::chrono::steady_clock::now();
-  const std::vector<Rollout> rollouts = RolloutsOf(logs);
+  RequireVelocities(robot, logs, "a model of somebody else's");
+  std::vector<Rollout> rollouts = RolloutsOf(logs);
+  const std::vector<std::string> still = ForgetStill(robot, &rollouts);
   const Prior prior = PriorOf(robot);
   RemoteErrors errors(robot, rollouts, model, options.progress);
   const LaplaceFit fit = Fit(errors, prior, model);
@@ -194,15 +201,18 @@ Findings CalibrateRemote(const RobotDescription& robot, std::span<const Log> log
   findings.samples = PhysicalColumns(robot, samples);
   findings.transitions = static_cast<int64_t>(CountTransitions(rollouts));
   findings.simulated_steps = errors.evaluations() * findings.transitions;
-  findings.noise_sd = errors.noise_sd();
-  findings.errors = fit.errors, findings.rows = errors.rows();
-  findings.discrepancy = fit.errors.cwiseAbs2().mean();
+  const OneStepView view = errors.View(fit);
+  findings.noise_sd = view.noise_sd;
+  findings.errors = view.fit.errors, findings.rows = view.rows;
+  findings.discrepancy = MeanSquaredError(view);
   findings.identifiability = FindIdentifiability(
       robot, fit.information, findings.prior.covariance.diagonal().cwiseSqrt(), fit.posterior);
   findings.cramer_rao = findings.identifiability.cramer_rao;
+  findings.misspecification.judged = false;
   findings.misspecification.summary = "not judged: the model is not ours";
   findings.holdout.summary = "nothing was held out: the model is not ours";
   findings.agreement.summary = "the logs were not compared: the model is not ours";
+  if (!still.empty()) findings.warnings.push_back(StillWarning(still));
   if (std::string contradiction = Contradiction(findings, robot); !contradiction.empty())
     findings.warnings.push_back(std::move(contradiction));
   findings.seconds = SecondsSince(start);

@@ -12,6 +12,8 @@
 #include "calibrator/fit/window_errors.h"
 #include "calibrator/inference/laplace.h"
 #include "calibrator/inference/slopes.h"
+#include "calibrator/motion/differences.h"
+#include "calibrator/motion/still_readings.h"
 #include "sim/model.h"
 
 namespace plumb {
@@ -25,12 +27,19 @@ CurriculumFit FirstFit(const std::shared_ptr<const Model>& model, std::span<cons
   return FitCurriculum(model, rollouts, options);
 }
 
+std::vector<Rollout> ReadMotion(const RobotDescription& robot, std::span<const Log> logs) {
+  RequireVelocities(robot, logs, "a model that is served");
+  std::vector<Rollout> rollouts = RolloutsOf(logs);
+  ForgetStill(robot, &rollouts);
+  return rollouts;
+}
+
 }  // namespace
 
 struct RobotModels::Parts {
   Parts(const RobotDescription& robot, std::span<const Log> logs, ExecutionOptions execution)
       : model(std::make_shared<Model>(robot)),
-        rollouts(RolloutsOf(logs)),
+        rollouts(ReadMotion(robot, logs)),
         first(FirstFit(model, rollouts, execution)),
         errors(model, rollouts, 1, execution),
         steps(model, rollouts, execution.threads),

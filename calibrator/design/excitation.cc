@@ -131,27 +131,12 @@ class Rater {
   }
 
   Eigen::MatrixXd Information(const Rollout& rollout, const Eigen::VectorXd& coordinates) {
-    const Eigen::Index d = coordinates.size();
-    const Eigen::VectorXd h = kDifference * belief_.covariance.diagonal().cwiseSqrt();
-    Eigen::MatrixXd physical(d, 2 * d + 1);
-    for (Eigen::Index i = 0; i < d; ++i) {
-      physical.col(2 * i) = robot_.ToPhysical(coordinates + h(i) * Eigen::VectorXd::Unit(d, i));
-      physical.col(2 * i + 1) = robot_.ToPhysical(coordinates - h(i) * Eigen::VectorXd::Unit(d, i));
-    }
-    physical.col(2 * d) = robot_.ToPhysical(coordinates);
-    const Eigen::MatrixXd errors = discrepancy_.Residuals(physical, std::span(&rollout, 1));
-    Eigen::MatrixXd jacobian(errors.rows(), d);
-    for (Eigen::Index i = 0; i < d; ++i) {
-      const auto above = errors.col(2 * i), below = errors.col(2 * i + 1),
-                 middle = errors.col(2 * d);
-      if (above.allFinite() && below.allFinite())
-        jacobian.col(i) = (above - below) / (2 * h(i));
-      else
-        jacobian.col(i) = (above.allFinite() ? above - middle : middle - below) / h(i);
-    }
-    if (!jacobian.allFinite())
-      return Eigen::MatrixXd::Zero(d, d);  // of a simulation that fails nothing is learned
-    return jacobian.transpose() * jacobian;
+    Eigen::MatrixXd information =
+        StepInformation(robot_, discrepancy_, std::span(&rollout, 1), coordinates,
+                        kDifference * belief_.covariance.diagonal().cwiseSqrt());
+    if (!information.allFinite())
+      information.setZero();  // of a failing simulation nothing is learnt
+    return information;
   }
 
   RatedExcitation Weigh(Excitation excitation, const std::vector<Motion>& motions) {

@@ -212,6 +212,8 @@ std::vector<WeakDirection> FindWeak(const Eigen::MatrixXd& information,
 
 }  // namespace
 
+double NullInformation(double largest) { return std::min(kNull * largest, kNullInformation); }
+
 Identifiability FindIdentifiability(const RobotDescription& robot,
                                     const Eigen::MatrixXd& information,
                                     const Eigen::VectorXd& prior_sd, const Gaussian& distribution) {
@@ -230,7 +232,7 @@ Identifiability FindIdentifiability(const RobotDescription& robot,
   const Eigen::MatrixXd scaled = prior_sd.asDiagonal() * information * prior_sd.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
   const Eigen::ArrayXd along = eigen.eigenvalues();
-  const double threshold = std::min(kNull * along(n - 1), kNullInformation);
+  const double threshold = NullInformation(along(n - 1));
   const Eigen::Index nulls = (along <= threshold).count();
   const Eigen::Index weak = std::max<Eigen::Index>(0, (along < kWeakInformation).count() - nulls);
   found.null = SparseBasis(prior_sd.asDiagonal() * eigen.eigenvectors().leftCols(nulls), prior_sd,
@@ -260,38 +262,38 @@ Identifiability FindIdentifiability(const RobotDescription& robot,
   return found;
 }
 
+Eigen::MatrixXd StepInformation(const RobotDescription& robot, Discrepancy& discrepancy,
+                                std::span<const Rollout> rollouts,
+                                const Eigen::VectorXd& coordinates, const Eigen::VectorXd& h) {
+  const Eigen::Index n = coordinates.size();
+  Eigen::MatrixXd physical(n, 2 * n + 1);  // ends and middle, all in one batch
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Eigen::VectorXd step = h(i) * Eigen::VectorXd::Unit(n, i);
+    physical.col(2 * i) = robot.ToPhysical(coordinates + step);
+    physical.col(2 * i + 1) = robot.ToPhysical(coordinates - step);
+  }
+  physical.col(2 * n) = robot.ToPhysical(coordinates);
+  const Eigen::MatrixXd errors = discrepancy.Residuals(physical, rollouts);
+  Eigen::MatrixXd jacobian(errors.rows(), n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const auto above = errors.col(2 * i), below = errors.col(2 * i + 1), middle = errors.col(2 * n);
+    if (above.allFinite() && below.allFinite())
+      jacobian.col(i) = (above - below) / (2 * h(i));
+    else
+      jacobian.col(i) = (above.allFinite() ? above - middle : middle - below) / h(i);
+  }
+  return jacobian.transpose() * jacobian;
+}
+
 Identifiability FindIdentifiability(const RobotDescription& robot, Discrepancy& discrepancy,
                                     std::span<const Rollout> rollouts,
                                     const Gaussian& distribution) {
-  const Eigen::Index n = distribution.mean.size();
-  Eigen::VectorXd prior_sd(n);
-  for (Eigen::Index i = 0; i < n; ++i) {
+  Eigen::VectorXd prior_sd(distribution.mean.size());
+  for (Eigen::Index i = 0; i < prior_sd.size(); ++i)
     prior_sd(i) = std::sqrt(robot.parameters[static_cast<size_t>(i)].coordinate_variance());
-  }
-  // The middle and both ends of each difference, all in one batch. Where one end is no simulator,
-  // as beyond friction 0, the other one has to do.
-  const Eigen::VectorXd h = 1e-4 * prior_sd;
-  Eigen::MatrixXd physical(n, 2 * n + 1);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    physical.col(2 * i) = robot.ToPhysical(distribution.mean + h(i) * Eigen::VectorXd::Unit(n, i));
-    physical.col(2 * i + 1) =
-        robot.ToPhysical(distribution.mean - h(i) * Eigen::VectorXd::Unit(n, i));
-  }
-  physical.col(2 * n) = robot.ToPhysical(distribution.mean);
-  const Eigen::MatrixXd residuals = discrepancy.Residuals(physical, rollouts);
-  Eigen::MatrixXd jacobian(residuals.rows(), n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const auto above = residuals.col(2 * i), below = residuals.col(2 * i + 1),
-               middle = residuals.col(2 * n);
-    if (above.allFinite() && below.allFinite()) {
-      jacobian.col(i) = (above - below) / (2 * h(i));
-    } else if (above.allFinite()) {
-      jacobian.col(i) = (above - middle) / h(i);
-    } else {
-      jacobian.col(i) = (middle - below) / h(i);
-    }
-  }
-  return FindIdentifiability(robot, jacobian.transpose() * jacobian, prior_sd, distribution);
+  return FindIdentifiability(
+      robot, StepInformation(robot, discrepancy, rollouts, distribution.mean, 1e-4 * prior_sd),
+      prior_sd, distribution);
 }
 
 }  // namespace plumb

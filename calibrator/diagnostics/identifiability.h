@@ -43,9 +43,12 @@ struct Identifiability {
   std::string summary;  ///< for people
 };
 
-/// From the Fisher information of the coordinates. A direction counts as null if the information
-/// along it, in units of the prior, is below 1e-6 of the largest, and below 0.01: less than the
-/// prior's by so much that it does not change the sd.
+/// The information along a direction, in units of the prior, up to which it counts as null: 1e-6 of
+/// the largest, but 0.01 at most, which is less than the prior's by so much that it does not change
+/// the sd.
+double NullInformation(double largest);
+
+/// From the Fisher information of the coordinates.
 /// @param information n x n; if it is not finite nothing is said to be known. @param prior_sd n, of
 /// the coordinates.
 /// @param distribution of the coordinates: what is known of the combinations. Thread-safe.
@@ -53,8 +56,15 @@ Identifiability FindIdentifiability(const RobotDescription& robot,
                                     const Eigen::MatrixXd& information,
                                     const Eigen::VectorXd& prior_sd, const Gaussian& distribution);
 
-/// The same with the information of the transitions' whitened one-step errors at
-/// `distribution.mean` (central differences).
+/// Fisher information of the coordinates, n x n, of the transitions' whitened one-step errors, by
+/// central differences; where one end is no simulator, as beyond friction 0, by the other one
+/// alone. Not finite where the simulation fails at both, or in the middle.
+/// @param h n, the differences.
+Eigen::MatrixXd StepInformation(const RobotDescription& robot, Discrepancy& discrepancy,
+                                std::span<const Rollout> rollouts,
+                                const Eigen::VectorXd& coordinates, const Eigen::VectorXd& h);
+
+/// The same with that information at `distribution.mean`.
 Identifiability FindIdentifiability(const RobotDescription& robot, Discrepancy& discrepancy,
                                     std::span<const Rollout> rollouts,
                                     const Gaussian& distribution);

@@ -65,9 +65,8 @@ SbcResult RunRobotSbc(std::shared_ptr<const Model> model, std::span<const Rollou
   LaplaceOptions curvature_only;
   curvature_only.max_iterations = 0;
   const LaplaceFit view = FitLaplace(ProblemOf(robot, errors), mean, curvature_only);
-  const Eigen::VectorXd sd = (prior.FromStandard(Eigen::VectorXd::Ones(prior.size())) - mean);
   for (const Combination& c :
-       FindIdentifiability(robot, view.information, sd, view.posterior).combinations) {
+       FindIdentifiability(robot, view.information, prior.Width(), view.posterior).combinations) {
     // a parameter on its own is among them already
     if ((c.power.array() != 0).count() < 2) continue;
     quantities.push_back(

@@ -57,8 +57,7 @@ Eigen::MatrixXd Directions(Eigen::Index size, int turns, Eigen::Index transition
 Eigen::MatrixXd StartSds(const OneStep& step, const Eigen::VectorXd& noise_sd) {
   Eigen::MatrixXd sds(noise_sd.size(), static_cast<Eigen::Index>(step.steps().size()));
   for (size_t i = 0; i < step.steps().size(); ++i) {
-    const Eigen::VectorXd sd = StartSd(*step.steps()[i].recorded);
-    sds.col(static_cast<Eigen::Index>(i)) = sd.array().isNaN().select(noise_sd, sd);
+    sds.col(static_cast<Eigen::Index>(i)) = StartSd(*step.steps()[i].recorded, noise_sd);
   }
   return sds;
 }
@@ -117,8 +116,7 @@ Witnesses::Witnesses(OneStep& step, std::span<const WindowErrors::Row> rows,
     for (Eigen::Index i = 0; i < height; ++i) {
       const int c = rows[first + static_cast<size_t>(i)].coordinate;
       coordinates.push_back(c);
-      const double sd = EndSd(recorded, c);
-      block.end_sd(i) = sd > 0 ? sd : noise_sd(c);
+      block.end_sd(i) = EndSd(recorded, c, noise_sd);
       block.sensitivity.row(i) = near.slope[static_cast<size_t>(k)].row(c);
       bends.row(i) = near.bend[static_cast<size_t>(k)].row(c);
     }

@@ -47,10 +47,8 @@ MethodResult ByApproximation(const MethodInput& input, const std::string& name,
       FitLaplace(ProblemOf(robot, errors), result.curriculum->fit.mode, curvature_only);
   Problem problem =
       RobotProblem(robot, errors, view, input.options.discrepancy, input.options.seed);
-  // the first fit counts, too
   result.simulated_steps += errors.simulated_steps();
-  const int64_t left = input.options.budget - result.simulated_steps;
-  const int64_t simulations = std::max<int64_t>(1, left / errors.steps());
+  const int64_t simulations = std::max<int64_t>(1, input.options.budget / errors.steps());
   const Simulate simulate = problem.simulate;
   BatchRunner here;
   problem.simulate = [&](const Eigen::MatrixXd& parameters, int64_t first) {
@@ -84,6 +82,10 @@ MethodResult ByApproximation(const MethodInput& input, const std::string& name,
     result.warnings.push_back(fmt::format(
         "{} looks at each {}th transition only, to try enough simulators within its budget", name,
         every));
+  if (simulations < kFewestSimulators)
+    result.warnings.push_back(fmt::format(
+        "a budget of {} transitions is enough for {} simulators, where {} are few: give more",
+        input.options.budget, simulations, kFewestSimulators));
   return result;
 }
 

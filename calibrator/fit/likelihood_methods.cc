@@ -42,9 +42,7 @@ WindowErrors WindowsOf(const MethodInput& input, const CurriculumFit& curriculum
 std::pair<double, double> AxisDrops(const LeastSquares& problem, const LaplaceFit& fit) {
   const Eigen::Index n = problem.prior.size();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(fit.standard.covariance);
-  const Eigen::VectorXd width = (problem.prior.FromStandard(Eigen::VectorXd::Ones(n)) -
-                                 problem.prior.FromStandard(-Eigen::VectorXd::Ones(n))) /
-                                2;
+  const Eigen::VectorXd width = problem.prior.Width();
   const Eigen::MatrixXd curvature =
       width.asDiagonal() * fit.information * width.asDiagonal() + Eigen::MatrixXd::Identity(n, n);
   std::vector<Eigen::VectorXd> steps{Eigen::VectorXd::Zero(n)};

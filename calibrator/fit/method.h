@@ -19,8 +19,8 @@ struct CalibrationOptions {
   std::string discrepancy = "likelihood";  ///< of AbcMethods(), see RobotProblem
   /// laplace: control steps of the windows, stage by stage
   std::vector<int> horizons{1, 5, 10, 50};
-  /// transitions that reps, simopt, the abc's and mixture may simulate; mixture up to twice as many
-  /// where the likelihood turns out to be rough
+  /// transitions that reps, simopt, the abc's and mixture may simulate. The abc's begin with a fit
+  /// that does not count; mixture takes what its own has left, but 50 samples a round at the least
   int64_t budget = 100'000;
   uint64_t seed = 1;
   bool residual = true;  ///< where the alarm speaks, learn what the model lacks (CloseGap)

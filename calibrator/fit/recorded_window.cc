@@ -72,6 +72,11 @@ double EndSd(const Transition& t, Eigen::Index c) {
   return c < t.next_q_sd.size() ? t.next_q_sd(c) : t.next_v_sd(c - t.next_q_sd.size());
 }
 
+double EndSd(const Transition& t, Eigen::Index c, const Eigen::VectorXd& noise_sd) {
+  const double sd = EndSd(t, c);
+  return sd > 0 ? sd : noise_sd(c);
+}
+
 const Eigen::VectorXd& NearEnd(const Transition& t) {
   return t.next_q.allFinite() ? t.next_q : t.q;
 }
@@ -105,6 +110,11 @@ Eigen::VectorXd StartSd(const Transition& t) {
   Eigen::VectorXd sd(t.q_sd.size() + t.v_sd.size());
   sd << t.q_sd, t.v_sd;
   return sd;
+}
+
+Eigen::VectorXd StartSd(const Transition& t, const Eigen::VectorXd& noise_sd) {
+  const Eigen::VectorXd sd = StartSd(t);
+  return sd.array().isNaN().select(noise_sd, sd);
 }
 
 void AddDisturbance(const Transition& t, std::span<const int> coordinates,

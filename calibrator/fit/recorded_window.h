@@ -49,6 +49,8 @@ void BeginTransition(const Rollout& rollout, size_t i, Simulator* simulator);
 double EndError(const ConfigurationSpace& space, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
                 const Transition& transition, Eigen::Index c);
 double EndSd(const Transition& transition, Eigen::Index c);
+/// The same, `noise_sd`'s where it is not known, or 0: no reading is exact.
+double EndSd(const Transition& transition, Eigen::Index c, const Eigen::VectorXd& noise_sd);
 /// The recorded positions nearest to a transition's end: rotations there are counted about these.
 const Eigen::VectorXd& NearEnd(const Transition& transition);
 /// Whether that entry was observed at all: of a quaternion all or nothing.
@@ -64,6 +66,8 @@ void MoveStart(const ConfigurationSpace& space, Eigen::Index c, double by, Windo
 
 /// Standard deviations of (q, v) at a transition's beginning: 0 = exact, NaN = not known.
 Eigen::VectorXd StartSd(const Transition& transition);
+/// The same, `noise_sd`'s where they are not known.
+Eigen::VectorXd StartSd(const Transition& transition, const Eigen::VectorXd& noise_sd);
 
 /// Makes what has disturbed a transition part of the uncertain state that it begins with, for
 /// WhitenWindow: a standard deviation of 1 for each direction, and the direction as a column.

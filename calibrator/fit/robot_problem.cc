@@ -40,9 +40,7 @@ Problem ByLikelihood(const std::shared_ptr<const LeastSquares>& problem, const L
   const Eigen::Index n = problem->prior.size();
   const Eigen::VectorXd scale = first.scale;
   const Eigen::MatrixXd slopes = first.jacobian;
-  const Eigen::VectorXd sd = (problem->prior.FromStandard(Eigen::VectorXd::Ones(n)) -
-                              problem->prior.FromStandard(-Eigen::VectorXd::Ones(n))) /
-                             2;
+  const Eigen::VectorXd sd = problem->prior.Width();
   Eigen::MatrixXd spread = slopes.transpose() * slopes;
   spread.diagonal() += sd.array().square().inverse().matrix();
   const Eigen::MatrixXd project = spread.llt().matrixL().solve(slopes.transpose());

@@ -203,10 +203,7 @@ Gaussian StreamingLaplace::standard() const {
 
 Gaussian StreamingLaplace::posterior() const {
   const Gaussian standard = this->standard();
-  // dx/du: exact for normal priors.
-  const Eigen::VectorXd width = (errors_.prior().FromStandard(mode_.array() + kSlopeDifference) -
-                                 errors_.prior().FromStandard(mode_.array() - kSlopeDifference)) /
-                                (2 * kSlopeDifference);
+  const Eigen::VectorXd width = errors_.prior().Slope(mode_);
   return {errors_.prior().FromStandard(mode_),
           width.asDiagonal() * standard.covariance * width.asDiagonal()};
 }

@@ -18,17 +18,15 @@ namespace {
 Eigen::MatrixXd WhitenTransition(const Transition& recorded, const std::vector<int>& coordinates,
                                  Eigen::MatrixXd raw, const Eigen::MatrixXd& sensitivity,
                                  const Eigen::VectorXd& noise_sd) {
-  const Eigen::VectorXd start_sd = StartSd(recorded);
   Eigen::VectorXd end_sd(raw.rows());
   Eigen::MatrixXd observed(sensitivity.size() > 0 ? raw.rows() : 0, sensitivity.cols());
   for (Eigen::Index i = 0; i < raw.rows(); ++i) {
     const int c = coordinates[static_cast<size_t>(i)];
-    const double sd = EndSd(recorded, c);
-    end_sd(i) = sd > 0 ? sd : noise_sd(c);
+    end_sd(i) = EndSd(recorded, c, noise_sd);
     if (observed.rows() > 0) observed.row(i) = sensitivity.row(c);
   }
   const std::array<Eigen::Index, 2> step{0, raw.rows()};
-  WhitenWindow(step, start_sd.array().isNaN().select(noise_sd, start_sd), observed, end_sd, raw);
+  WhitenWindow(step, StartSd(recorded, noise_sd), observed, end_sd, raw);
   return raw;
 }
 

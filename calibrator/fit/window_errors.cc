@@ -100,8 +100,7 @@ const Transition& WindowErrors::TransitionOf(const Row& row) const {
 }
 
 double WindowErrors::NoiseOf(const Row& row) const {
-  const double sd = EndSd(TransitionOf(row), row.coordinate);
-  return sd > 0 ? sd : noise_sd_(row.coordinate);  // no reading is exact
+  return EndSd(TransitionOf(row), row.coordinate, noise_sd_);
 }
 
 Eigen::VectorXd WindowErrors::EndNoise() const {

@@ -15,7 +15,7 @@ constexpr int kMaxKernels = 2'000, kMaxFitted = 2'000, kMaxComponents = 16;
 Posterior AbcPosterior(const Prior& prior, const std::optional<AdjustedSamples>& kept, int count,
                        Random& random) {
   Posterior posterior;
-  if (kept) {
+  if (kept && kept->samples.cols() >= prior.size() + 2) {
     const GaussianMixture density =
         KernelDensity(kept->samples, kept->weights, kMaxKernels, random);
     posterior.samples = prior.FromStandard(Sample(density, count, random));

@@ -26,8 +26,8 @@ struct RejectionDiagnostics {
 
 /// Approximate Bayesian computation by rejection (Pritchard et al., Molecular Biology and Evolution
 /// 16, 1999): simulates draws of the prior and keeps those whose outcomes are nearest to the
-/// observed one. The baseline other methods must beat. Failed simulations are never kept; if all
-/// fail the posterior is the prior, and `kept` is 0.
+/// observed one. The baseline other methods must beat. Failed simulations are never kept; where
+/// fewer than n + 2 are, the posterior is the prior (AbcPosterior).
 /// @throws std::invalid_argument for options that make no sense or if nothing was observed.
 Posterior InferByRejection(const Problem& problem, const RejectionOptions& options, uint64_t seed,
                            RejectionDiagnostics* diagnostics = nullptr);

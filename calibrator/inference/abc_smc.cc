@@ -44,11 +44,12 @@ struct Generation {
   std::vector<Index> accepted;
 };
 
-// Covariance of each member's kernel.
-GaussianMixture Kernels(const Population& population, bool local) {
+// Covariance of each member's kernel: of the nearest quarter of the population, as there may be
+// several modes.
+GaussianMixture Kernels(const Population& population) {
   const Index count = population.u.cols(), n = population.u.rows();
   const VectorXd& w = population.weights;
-  const double h = Bandwidth(1 / w.squaredNorm(), n, BandwidthRule::kSilverman);
+  const double h = Bandwidth(1 / w.squaredNorm(), n);
   const auto spread = [&](const std::vector<Index>& members, const VectorXd& about) -> MatrixXd {
     const VectorXd shares = w(members) / w(members).sum();
     const MatrixXd offset = population.u(Eigen::all, members).colwise() - about;
@@ -59,13 +60,8 @@ GaussianMixture Kernels(const Population& population, bool local) {
   std::vector<Index> all(static_cast<size_t>(count));
   std::iota(all.begin(), all.end(), 0);
   GaussianMixture kernels{{w.begin(), w.end()}, {}};
-  const MatrixXd global = spread(all, population.u * w);
   const Index neighbours = std::max(count / 4, std::min(count, n + 2));
   for (Index i = 0; i < count; ++i) {
-    if (!local) {
-      kernels.components.push_back({population.u.col(i), global});
-      continue;
-    }
     const VectorXd squared = (population.u.colwise() - population.u.col(i)).colwise().squaredNorm();
     std::vector<Index> near = all;
     std::nth_element(near.begin(), near.begin() + (neighbours - 1), near.end(),
@@ -162,7 +158,7 @@ class Smc {
     const double next = NearestRankQuantile(distances_, options_.quantile);
     if (!(next < (1 - options_.min_change) * distances_.maxCoeff())) return false;
     epsilon_ = next;
-    kernels_ = Kernels(population_, options_.local_kernels);
+    kernels_ = Kernels(population_);
     return true;
   }
 

@@ -18,8 +18,6 @@ struct SmcOptions {
   double quantile = 0.5;         ///< of the accepted distances: the next generation's epsilon
   double min_acceptance = 1e-2;  ///< stop after a generation that accepted less of its simulations
   double min_change = 1e-3;      ///< stop when epsilon falls by less than this, relatively
-  /// from the nearest quarter of the population (several modes), not all of it
-  bool local_kernels = true;
   std::string distance = "mahalanobis";  ///< of distances.h
   bool adjust = true;                    ///< regression_adjustment.h on the last generation
   int samples = 10'000;                  ///< of the kernel density on it

@@ -28,14 +28,13 @@ VectorXd SystematicCounts(const VectorXd& weights, int draws, Random& random) {
 
 }  // namespace
 
-double Bandwidth(double effective, Index n, BandwidthRule rule) {
+double Bandwidth(double effective, Index n) {
   const double d = static_cast<double>(n);
-  const double scott = std::pow(effective, -1 / (d + 4));
-  return rule == BandwidthRule::kScott ? scott : std::pow(4 / (d + 2), 1 / (d + 4)) * scott;
+  return std::pow(4 / (d + 2), 1 / (d + 4)) * std::pow(effective, -1 / (d + 4));
 }
 
 GaussianMixture KernelDensity(const MatrixXd& samples, const VectorXd& weights, int max_components,
-                              Random& random, BandwidthRule rule) {
+                              Random& random) {
   const double sum = weights.sum();
   if (samples.cols() == 0 || samples.cols() != weights.size() || !(weights.minCoeff() >= 0) ||
       !(sum > 0) || !std::isfinite(sum) || max_components < 1) {
@@ -59,7 +58,7 @@ GaussianMixture KernelDensity(const MatrixXd& samples, const VectorXd& weights, 
     w = SystematicCounts(w, max_components, random) / max_components;
     effective = std::min<double>(effective, max_components);
   }
-  const double h = Bandwidth(effective, x.rows(), rule);
+  const double h = Bandwidth(effective, x.rows());
   kernel *= h * h;
   // Samples that all agree somewhere must still leave a density.
   kernel.diagonal().array() += 1e-12 * std::max(kernel.diagonal().maxCoeff(), 1e-12);

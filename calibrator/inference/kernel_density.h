@@ -9,12 +9,9 @@ namespace plumb {
 
 // The functions here share nothing: thread-safe.
 
-enum class BandwidthRule { kSilverman, kScott };
-
 /// Factor on a standard deviation that makes a kernel's (Silverman, "Density estimation", 1986, eq.
-/// 4.14-4.15; Scott, "Multivariate density estimation", 1992, eq. 6.42): (4 / (n_eff (n + 2)))^(1 /
-/// (n + 4)) and n_eff^(-1 / (n + 4)).
-double Bandwidth(double effective, Eigen::Index n, BandwidthRule rule);
+/// 4.14-4.15): (4 / (n_eff (n + 2)))^(1 / (n + 4)).
+double Bandwidth(double effective, Eigen::Index n);
 
 /// The non-parametric form of a distribution known by weighted samples: a Gaussian kernel on each,
 /// all of the samples' covariance times the square of the bandwidth for their effective number,
@@ -25,7 +22,6 @@ double Bandwidth(double effective, Eigen::Index n, BandwidthRule rule);
 /// @param samples n x N, finite where they have weight. @param weights N, >= 0, of positive sum.
 /// @throws std::invalid_argument otherwise.
 GaussianMixture KernelDensity(const Eigen::MatrixXd& samples, const Eigen::VectorXd& weights,
-                              int max_components, Random& random,
-                              BandwidthRule rule = BandwidthRule::kSilverman);
+                              int max_components, Random& random);
 
 }  // namespace plumb

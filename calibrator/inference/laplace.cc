@@ -171,10 +171,7 @@ class Fit {
     fit.standard = {u_, Eigen::MatrixXd(widened + identity).llt().solve(identity)};
     fit.standard.covariance =
         (fit.standard.covariance + fit.standard.covariance.transpose()).eval() / 2;
-    // dx/du: exact for normal priors.
-    const Eigen::VectorXd width = (problem_.prior.FromStandard(u_.array() + kDifference) -
-                                   problem_.prior.FromStandard(u_.array() - kDifference)) /
-                                  (2 * kDifference);
+    const Eigen::VectorXd width = problem_.prior.Slope(u_);
     fit.posterior = {fit.mode, width.asDiagonal() * fit.standard.covariance * width.asDiagonal()};
     const Eigen::VectorXd narrow = width.cwiseInverse();
     fit.information = narrow.asDiagonal() * information * narrow.asDiagonal();

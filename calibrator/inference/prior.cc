@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "calibrator/inference/slopes.h"
 #include "common/gaussian.h"
 #include "common/special_numbers.h"
 
@@ -60,6 +61,16 @@ Eigen::MatrixXd Prior::FromStandard(const Eigen::MatrixXd& u) const {
       x(i, j) = plumb::FromStandard(marginals_[static_cast<size_t>(i)], u(i, j));
   }
   return x;
+}
+
+Eigen::VectorXd Prior::Slope(const Eigen::VectorXd& u) const {
+  return (FromStandard(u.array() + kSlopeDifference) - FromStandard(u.array() - kSlopeDifference)) /
+         (2 * kSlopeDifference);
+}
+
+Eigen::VectorXd Prior::Width() const {
+  const Eigen::VectorXd one = Eigen::VectorXd::Ones(size());
+  return (FromStandard(one) - FromStandard(-one)) / 2;
 }
 
 double Prior::LogDensity(const Eigen::VectorXd& x) const {

@@ -31,6 +31,10 @@ class Prior {
   /// Column by column; any number of columns. Beyond a uniform prior's bounds u is infinite.
   Eigen::MatrixXd ToStandard(const Eigen::MatrixXd& x) const;
   Eigen::MatrixXd FromStandard(const Eigen::MatrixXd& u) const;
+  /// dx/du at a point u of standard coordinates: exact for normal marginals.
+  Eigen::VectorXd Slope(const Eigen::VectorXd& u) const;
+  /// Half of what lies between u = -1 and u = 1: the standard deviation of a normal marginal.
+  Eigen::VectorXd Width() const;
   /// ln p(x) of one point; -infinity outside of the bounds.
   double LogDensity(const Eigen::VectorXd& x) const;
   /// n x count draws.

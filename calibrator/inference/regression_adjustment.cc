@@ -46,7 +46,7 @@ MatrixXd Regress(const MatrixXd& design, const MatrixXd& targets, const VectorXd
 
 AdjustedSamples AdjustByRegression(const MatrixXd& parameters, const MatrixXd& outcomes,
                                    const VectorXd& observed, const VectorXd& distances,
-                                   const VectorXd& weights, bool heteroscedastic) {
+                                   const VectorXd& weights) {
   const Index count = parameters.cols();
   if (outcomes.cols() != count || distances.size() != count || weights.size() != count ||
       outcomes.rows() != observed.size()) {
@@ -74,14 +74,7 @@ AdjustedSamples AdjustByRegression(const MatrixXd& parameters, const MatrixXd& o
   }
   const MatrixXd u = parameters(Eigen::all, used);
   const MatrixXd coefficients = Regress(design, u, w_used);
-  MatrixXd residuals = u - coefficients * design;
-  if (heteroscedastic) {
-    const MatrixXd log_squares = (residuals.array().square() + 1e-300).log();
-    const MatrixXd spread = Regress(design, log_squares, w_used);
-    const double most = std::log(10);
-    const MatrixXd log_ratio = ((spread.col(0).replicate(1, design.cols()) - spread * design) / 2);
-    residuals.array() *= log_ratio.array().max(-most).min(most).exp();
-  }
+  const MatrixXd residuals = u - coefficients * design;
   result.samples(Eigen::all, used) = residuals.colwise() + coefficients.col(0);
   return result;
 }

@@ -15,9 +15,6 @@ struct AdjustedSamples {
 /// Regression adjustment of approximate Bayesian computation. With weights w_i = v_i (1 - (d_i /
 /// d_max)^2) (Epanechnikov), fits u = a + B (s - observed) + e by weighted least squares and
 /// returns u_i - B (s_i - observed) (Beaumont, Zhang & Balding, Genetics 162, 2002, eq. 3-5).
-/// Heteroscedastic (Blum & Francois, Statistics and Computing 20, 2010, eq. 8, with their
-/// local-linear estimates): ln e^2 is fitted in the same way, and residuals are rescaled by
-/// sigma(observed) / sigma(s_i), by no more than ten either way.
 ///
 /// @param parameters n x N in standard coordinates: no bounds to be crossed. @param outcomes m x N,
 /// finite where `distances` is; entries of `observed` that are NaN are not used. @param distances
@@ -28,7 +25,7 @@ struct AdjustedSamples {
 /// match.
 AdjustedSamples AdjustByRegression(const Eigen::MatrixXd& parameters,
                                    const Eigen::MatrixXd& outcomes, const Eigen::VectorXd& observed,
-                                   const Eigen::VectorXd& distances, const Eigen::VectorXd& weights,
-                                   bool heteroscedastic = false);
+                                   const Eigen::VectorXd& distances,
+                                   const Eigen::VectorXd& weights);
 
 }  // namespace plumb

@@ -1,8 +1,12 @@
 #include "calibrator/motion/differences.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <stdexcept>
 
 #include "common/special_numbers.h"
 #include "robot/physical.h"
@@ -87,6 +91,18 @@ std::vector<std::string> UnreadJoints(const RobotDescription& robot,
   std::vector<std::string> joints;
   for (const JointDescription& joint : robot.joints) joints.push_back(joint.name);
   return joints;
+}
+
+void RequireVelocities(const RobotDescription& robot, std::span<const Log> logs,
+                       const std::string& who) {
+  for (const Log& log : logs) {
+    const std::vector<std::string> unread = UnreadJoints(robot, log.differenced);
+    if (!unread.empty())
+      throw std::invalid_argument(fmt::format(
+          "{}: nobody has read the velocities of {}, and {} is compared with single control steps, "
+          "which need them; record velocities, or use auto, laplace or mixture, which do without",
+          log.name, fmt::join(unread, ", "), who));
+  }
 }
 
 void ForgetVelocities(const RobotDescription& robot, std::span<const std::string> joints,

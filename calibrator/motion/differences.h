@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "calibrator/motion/log.h"
 #include "calibrator/motion/motion_table.h"
 #include "calibrator/motion/transitions.h"
 #include "robot/configuration_space.h"
@@ -36,6 +37,12 @@ std::string DifferencesWarning(std::span<const std::string> joints);
 /// calibration is to use positions alone. Thread-safe.
 std::vector<std::string> UnreadJoints(const RobotDescription& robot,
                                       std::span<const std::string> differenced);
+
+/// For what compares single control steps, which need velocities that were read.
+/// @param who compares, to begin a sentence with. @throws std::invalid_argument where UnreadJoints
+/// has some of a log: the log, and the joints. Thread-safe.
+void RequireVelocities(const RobotDescription& robot, std::span<const Log> logs,
+                       const std::string& who);
 
 /// Takes these joints' velocities for what they are: nobody has read them. Those at transitions'
 /// ends become NaN; those with which transitions begin become guesses, the central differences of

@@ -1,5 +1,8 @@
 #include "calibrator/motion/still_readings.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 
 #include "calibrator/motion/differences.h"
@@ -80,6 +83,11 @@ std::vector<std::string> ForgetStill(const RobotDescription& robot,
     }
   }
   return names;
+}
+
+std::string StillWarning(std::span<const std::string> forgotten) {
+  return fmt::format("nothing is learnt from what never changed, which may have read nothing: {}",
+                     fmt::join(forgotten, ", "));
 }
 
 }  // namespace plumb

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,5 +16,8 @@ namespace plumb {
 /// to nothing. Leaves all as it is where nothing ever changed. Thread-safe.
 /// @return "q/knee", "v/knee" and so on: those that were forgotten.
 std::vector<std::string> ForgetStill(const RobotDescription& robot, std::vector<Rollout>* rollouts);
+
+/// What that means: a sentence.
+std::string StillWarning(std::span<const std::string> forgotten);
 
 }  // namespace plumb

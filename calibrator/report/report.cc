@@ -26,7 +26,6 @@ using Coordinate = ParameterDescription::Coordinate;
 using Index = Eigen::Index;
 
 constexpr Index kMaxPairs = 8;
-constexpr double kNull = 1e-6;  // as FindIdentifiability has it
 constexpr double kInvolved = 1e-3;
 constexpr double kHardly = 0.22;  // nat: the data made the sd smaller by less than a fifth
 
@@ -69,12 +68,7 @@ class Report {
     const bool all_known =
         findings_.identifiability.null.empty() && !findings_.identifiability.summary.empty();
     html += Verdict(all_known ? "good" : "", "What can be known", KnownSummary() + Values());
-    const Misspecification& model = findings_.misspecification;
-    html += model.alarm ? Verdict("bad", "The model does not explain the robot", model.summary)
-            : model.summary.empty()
-                ? Verdict("", "The model was not tested",
-                          "Whether it can explain the robot is not known.")
-                : Verdict("good", "The model explains the robot", model.summary);
+    html += ModelVerdict(findings_.misspecification);
     if (!findings_.gap.summary.empty()) html += Verdict("", "What it lacks", findings_.gap.summary);
     const bool tried = std::any_of(findings_.holdout.errors.begin(), findings_.holdout.errors.end(),
                                    [](const HorizonError& e) { return e.windows > 0; });
@@ -91,6 +85,16 @@ class Report {
     for (const std::string& warning : findings_.warnings)
       html += Verdict("bad", "Warning", warning);
     return html + "</div>\n";
+  }
+
+  static std::string ModelVerdict(const Misspecification& model) {
+    if (model.alarm) return Verdict("bad", "The model does not explain the robot", model.summary);
+    if (model.summary.empty())
+      return Verdict("", "The model was not tested",
+                     "Whether it can explain the robot is not known.");
+    if (!model.judged)
+      return Verdict("", "Nobody can tell whether the model explains the robot", model.summary);
+    return Verdict("good", "The model explains the robot", model.summary);
   }
 
   std::string KnownSummary() const {
@@ -199,7 +203,7 @@ class Report {
       html += table.Print();
     }
     html += Paragraph(findings_.advice);
-    const std::string scree = ScreePlot(InformationEigenvalues(), kNull);
+    const std::string scree = ScreePlot(InformationEigenvalues());
     const Width width = scree.empty() ? Width::kFull : Width::kHalf;
     html = Panel(width, "What can be known from this motion",
                  "The parameters, or combinations of them, that the motion tells apart.", html);
@@ -208,8 +212,8 @@ class Report {
            Panel(
                width, "How much the motion tells",
                "Eigenvalues of the Fisher information in units of the prior, greatest first. Along "
-               "a direction with 1 (dashed) the data tell as much as the prior; what is below a "
-               "millionth of the greatest (dotted) cannot be known from them.",
+               "a direction with 1 (dashed) the data tell as much as the prior; what is below the "
+               "dotted line, a millionth of the greatest or 0.01, cannot be known from them.",
                scree);
   }
 

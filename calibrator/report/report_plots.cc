@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 
+#include "calibrator/diagnostics/identifiability.h"
 #include "plot/curves.h"
 #include "plot/svg.h"
 #include "robot/coordinate_names.h"
@@ -51,10 +52,11 @@ std::string ErrorPlot(const std::vector<HorizonError>& errors) {
   return svg.Print();
 }
 
-std::string ScreePlot(const std::vector<double>& eigenvalues, double null) {
+std::string ScreePlot(const std::vector<double>& eigenvalues) {
   const double highest = eigenvalues.empty() ? NAN : eigenvalues.front();
   if (!(highest > 0) || !std::isfinite(highest)) return "";
-  double lowest = std::min(1., highest * null);
+  const double null = NullInformation(highest);
+  double lowest = std::min(1., null);
   for (const double value : eigenvalues) {
     if (value > 0) lowest = std::min(lowest, value);
   }
@@ -67,7 +69,7 @@ std::string ScreePlot(const std::vector<double>& eigenvalues, double null) {
                std::max(1., highest) * std::max(2., std::pow(range, 0.05)), 246, 12, true);
   svg.Frame(x, y, "", "information", 1, 8);
   svg.Line(x.from(), y.Pixel(1), x.to(), y.Pixel(1), "prior line");
-  svg.Line(x.from(), y.Pixel(highest * null), x.to(), y.Pixel(highest * null), "limit");
+  svg.Line(x.from(), y.Pixel(null), x.to(), y.Pixel(null), "limit");
   const double width = std::min(46., 0.6 * (x.to() - x.from()) / count);
   for (size_t i = 0; i < eigenvalues.size(); ++i) {
     const double at = x.Pixel(static_cast<double>(i + 1)),

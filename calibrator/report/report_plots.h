@@ -24,9 +24,9 @@ inline std::string WithUnit(const ParameterDescription& p) {
 std::string ErrorPlot(const std::vector<HorizonError>& errors);
 
 /// Eigenvalues of the Fisher information in units of the prior, in decreasing order, on a
-/// logarithmic axis. Lines: 1 = as much as the prior knows, dashed; `null` times the greatest,
-/// below which nothing is identifiable, dotted.
-std::string ScreePlot(const std::vector<double>& eigenvalues, double null);
+/// logarithmic axis. Lines: 1 = as much as the prior knows, dashed; NullInformation, below which
+/// nothing is identifiable, dotted.
+std::string ScreePlot(const std::vector<double>& eigenvalues);
 
 /// Whitened residuals against the standard normal distribution.
 std::string ResidualHistogram(const std::vector<double>& residuals);

@@ -1,7 +1,6 @@
 #include "calibrator/results/calibration.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <chrono>
 #include <cmath>
@@ -74,10 +73,7 @@ class Calibration {
     JudgeSubstep(fit);
     JudgeRows(fit.view);
     CompareLogs();
-    if (!still_.empty())
-      findings_.warnings.push_back(
-          fmt::format("nothing is learnt from what never changed, which may have read nothing: {}",
-                      fmt::join(still_, ", ")));
+    if (!still_.empty()) findings_.warnings.push_back(StillWarning(still_));
     if (std::string contradiction = Contradiction(findings_, robot_); !contradiction.empty())
       findings_.warnings.insert(findings_.warnings.begin(), std::move(contradiction));
     findings_.seconds = SecondsSince(start);

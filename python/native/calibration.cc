@@ -169,7 +169,7 @@ void BindFindings(py::class_<Calibration>& calibration) {
   finding(
       "trustworthy", [](const Findings& f) { return Trustworthy(f); },
       "What plumb calibrate --strict asks for: better than the prior on motion not seen, no "
-      "alarm, the motions agree, and the prior is not contradicted.");
+      "alarm, the motions agree, efforts stand in their rows, and the prior is not contradicted.");
   finding("findings", &Words, "In words, those that the command prints.");
   finding(
       "warnings", [](const Findings& f) { return f.warnings; }, "In words.");

@@ -10,6 +10,7 @@
 
 #include "http/client.h"
 #include "http/http.h"
+#include "umbridge/robot_models.h"
 #include "umbridge/server.h"
 
 namespace plumb {
@@ -146,6 +147,37 @@ TEST_CASE("somebody else's linear model has the posterior of linear regression")
   CHECK(found.transitions == kOutcomes);
   CHECK_THAT(found.misspecification.summary, Catch::Contains("not judged"));
   CHECK(found.warnings.empty());
+  if (known) {
+    CHECK(found.discrepancy == Approx(1).epsilon(0.1));
+  } else {
+    CHECK(std::isnan(found.discrepancy));  // nobody knows the noise
+  }
+  for (const double sd : found.noise_sd) CHECK(sd == Approx(kOutcomeNoise).epsilon(0.15));
+}
+
+TEST_CASE("errors that are larger than the recorded noise are told") {
+  const RobotDescription robot = TwoMasses();
+  std::vector<Log> logs{Record(Eigen::Vector2d(1.7, 0.6), true)};
+  for (Transition& t : logs[0].rollouts[0].transitions) t.next_q_sd /= 3, t.next_v_sd /= 3;
+  const Serving serving({NextStates()});
+  RemoteModel model(serving.url(), "next_states", 2, NextStatesSize(robot, logs));
+  const Findings found = CalibrateRemote(robot, logs, model, {});
+  CHECK(found.discrepancy == Approx(9).epsilon(0.1));
+  for (const double sd : found.noise_sd) CHECK(sd == Approx(kOutcomeNoise).epsilon(0.15));
+}
+
+TEST_CASE("velocities that nobody has read are no end of a step for somebody else's model") {
+  RobotDescription robot = TwoMasses();
+  std::vector<Log> logs{Record(Eigen::Vector2d(1.7, 0.6), true)};
+  logs[0].name = "swing.csv", logs[0].differenced = {"slider"};
+  const Serving serving({NextStates()});
+  RemoteModel model(serving.url(), "next_states", 2, NextStatesSize(robot, logs));
+  CHECK_THROWS_WITH(
+      CalibrateRemote(robot, logs, model, {}),
+      Catch::StartsWith("swing.csv: nobody has read the velocities of slider, and a model of "));
+  logs[0].differenced.clear(), robot.calibration.velocities = false;
+  CHECK_THROWS_WITH(CalibrateRemote(robot, logs, model, {}), Catch::Contains("velocities of "));
+  CHECK_THROWS_WITH(RobotModels(robot, logs, {}), Catch::Contains("a model that is served"));
 }
 
 TEST_CASE("what somebody else's model says against the prior is told") {

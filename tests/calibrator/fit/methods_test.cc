@@ -10,6 +10,7 @@
 
 #include "calibrator/fit/likelihood_methods.h"
 #include "calibrator/fit/robot_problem.h"
+#include "robot/parameter_distribution.h"
 #include "tests/calibrator/fitted_log.h"
 
 namespace plumb {
@@ -68,6 +69,33 @@ TEST_CASE("a distance of errors is not led to a zero that no simulator has") {
       CHECK(std::abs(off) < 2 * sd);
     }
   }
+}
+
+TEST_CASE("the fit that approximate Bayesian computation begins with leaves it its simulators") {
+  const RobotDescription robot = Robot("pendulum");
+  const auto model = std::make_shared<Model>(robot);
+  const std::vector<Rollout> log = RandomLog(robot, {{}, 1e-3, 5e-3}, 600, 3);
+  CalibrationOptions options;
+  options.method = "laplace";
+  const Gaussian exact = Moments(RunMethod({model, log, options}).posterior);
+  const Gaussian prior = PriorGaussian(robot);
+  for (const char* method : {"abc-rejection", "abc-smc", "conditional-mixture"}) {
+    CAPTURE(method);
+    options.method = method;
+    const MethodResult result = RunMethod({model, log, options});
+    CAPTURE(result.check);
+    const Gaussian posterior = Moments(result.posterior);
+    // Of each parameter no less is known than before, and no more than there is to be known.
+    const Eigen::VectorXd sd = posterior.covariance.diagonal().cwiseSqrt();
+    CHECK((sd.array() > 0.5 * exact.covariance.diagonal().cwiseSqrt().array()).all());
+    CHECK((sd.array() < 1.2 * prior.covariance.diagonal().cwiseSqrt().array()).all());
+    CHECK(posterior.covariance.determinant() < 0.3 * prior.covariance.determinant());
+    for (const std::string& warning : result.warnings)
+      CHECK_THAT(warning, !Catch::Contains("give more"));
+  }
+  options.method = "abc-rejection", options.budget = 100;
+  CHECK_THAT(RunMethod({model, log, options}).warnings.back(),
+             Catch::Contains("100 simulators, where 3000 are few: give more"));
 }
 
 TEST_CASE("how well parameters are determined is a guess where hardly a sample counts") {

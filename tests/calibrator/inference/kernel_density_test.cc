@@ -8,8 +8,7 @@ namespace plumb {
 namespace {
 
 TEST_CASE("a kernel density has the samples' moments, wider by the bandwidth, thinned or not") {
-  CHECK(Bandwidth(100, 1, BandwidthRule::kSilverman) == Approx(std::pow(4. / 300, 0.2)));
-  CHECK(Bandwidth(100, 1, BandwidthRule::kScott) == Approx(std::pow(100, -0.2)));
+  CHECK(Bandwidth(100, 1) == Approx(std::pow(4. / 300, 0.2)));
   Random random(3);
   const Eigen::MatrixXd samples = StandardNormals(2, 2'000, random);
   // Importance weights that move the mean of N(0, I) to (0.5, 0).
@@ -18,7 +17,7 @@ TEST_CASE("a kernel density has the samples' moments, wider by the bandwidth, th
   for (const int most : {5'000, 300}) {
     const GaussianMixture density = KernelDensity(samples, weights, most, random);
     CHECK(static_cast<int>(density.components.size()) <= most);
-    const double h = Bandwidth(std::min<double>(effective, most), 2, BandwidthRule::kSilverman);
+    const double h = Bandwidth(std::min<double>(effective, most), 2);
     const Gaussian moments = Moments(density);
     const Eigen::VectorXd mean = samples * weights / weights.sum();
     const Eigen::MatrixXd centred = samples.colwise() - mean;

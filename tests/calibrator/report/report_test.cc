@@ -119,6 +119,20 @@ TEST_CASE("of many parameters the eight are drawn that the data have told most a
   CHECK(Count(pairs, "Z\"/>") == 28 * 2 * 3);
 }
 
+TEST_CASE("a model that nobody could judge is not said to explain the robot") {
+  const RobotDescription robot = Pendulum();
+  Findings findings = SampleFindings(robot);
+  findings.misspecification = {};
+  findings.misspecification.summary = "errors as large as they should be";
+  CHECK_THAT(ReportHtml(findings, robot, SampleProvenance(), {}),
+             Contains("<b>The model explains the robot</b>"));
+  findings.misspecification.judged = false;
+  findings.misspecification.summary = "only 15 of 115 transitions can tell";
+  const std::string html = ReportHtml(findings, robot, SampleProvenance(), {});
+  CHECK_THAT(html, !Contains("The model explains the robot"));
+  CHECK_THAT(html, Contains("Nobody can tell whether the model explains the robot"));
+}
+
 TEST_CASE("whatever files call things, the page stays a page") {
   RobotDescription robot = Pendulum();
   const std::string evil = "</title><script>alert('\"&')</script>\xff\x01\xed\xa0\x80-->";
