@@ -66,7 +66,7 @@ class ClosedLoop {
                    {UrlsOf(robot_.buses), process.lcm_url(),
                     setting.coordinator() ? setting.coordinator()->clock() : clock_.ToString(),
                     process.key_file(), setting.run, setting.output},
-                   setting.coordinator()) {
+                   setting.robot.driver, setting.coordinator()) {
     if (!setting.virtual_run) return;
     setting.coordinator()->on_note = [this](const std::string& line) { Print("plumb: " + line); };
     setting.coordinator()->go_on = [this] { return GoOn(); };

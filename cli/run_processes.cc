@@ -167,7 +167,7 @@ void RunProcesses::StopInRealTime() {
     if (child.name() != kRobotProcess && child.name() != kRecorder) child.Signal(SIGTERM);
   }
   for (Child& child : children_) {
-    if (child.name() == kDriver) child.WaitFor(0.5);
+    if (child.name() == kDriver) child.WaitFor(disarm_patience_ + 0.2);
   }
   for (Child& child : children_) child.Signal(SIGTERM);
   const auto start = SteadyClock::now();

@@ -8,6 +8,7 @@
 #include "cli/child.h"
 #include "cli/launch.h"
 #include "common/lockstep/coordinator.h"
+#include "robot/settings/driver.h"
 
 namespace plumb {
 
@@ -25,8 +26,12 @@ class RunProcesses {
   };
 
   /// @param coordinator of a run in virtual time; null in real time.
-  RunProcesses(const LaunchFlags& flags, Where where, Coordinator* coordinator)
-      : flags_(flags), where_(std::move(where)), coordinator_(coordinator) {}
+  RunProcesses(const LaunchFlags& flags, Where where, const DriverSettings& driver,
+               Coordinator* coordinator)
+      : flags_(flags),
+        where_(std::move(where)),
+        disarm_patience_(DisarmPatience(driver)),
+        coordinator_(coordinator) {}
   ~RunProcesses() { Stop(true); }
 
   /// @throws std::runtime_error if one cannot be started.
@@ -54,6 +59,7 @@ class RunProcesses {
 
   const LaunchFlags& flags_;
   const Where where_;
+  const double disarm_patience_;  // [s]
   Coordinator* coordinator_;
   double patience_ = 5;  // [s] of real time for the motors to be switched off in virtual time
   std::vector<Child> children_;

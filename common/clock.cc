@@ -76,13 +76,8 @@ timespec Clock::RealDuration(int64_t scaled_us) const {
 
 int64_t Periodic::Advance(int64_t now) {
   const int64_t lateness = now - deadline_;
-  ++cycles_;
   deadline_ += period_;
-  if (deadline_ <= now) {
-    const int64_t missed = (now - deadline_) / period_ + 1;
-    overruns_ += missed;
-    deadline_ += missed * period_;
-  }
+  if (deadline_ <= now) deadline_ += ((now - deadline_) / period_ + 1) * period_;
   return lateness;
 }
 

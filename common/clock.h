@@ -69,18 +69,13 @@ class Periodic {
   int64_t Remaining(int64_t now) const { return deadline_ > now ? deadline_ - now : 0; }
   bool Due(int64_t now) const { return now >= deadline_; }
 
-  /// Moves on to the next deadline after `now`. Deadlines that were missed altogether are skipped
-  /// and counted as overruns. @return how late this one was [us].
+  /// Moves on to the next deadline after `now`, and skips those that were missed altogether.
+  /// @return how late this one was [us].
   int64_t Advance(int64_t now);
-
-  int64_t cycles() const { return cycles_; }
-  int64_t overruns() const { return overruns_; }
 
  private:
   int64_t period_;
   int64_t deadline_;
-  int64_t cycles_ = 0;
-  int64_t overruns_ = 0;
 };
 
 }  // namespace plumb

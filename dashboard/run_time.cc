@@ -2,22 +2,18 @@
 
 #include <algorithm>
 
+#include "common/identity.h"
 #include "robot/physical.h"
 
 namespace plumb {
-namespace {
-
-constexpr int64_t kOld = 10'000'000;  // [us], as ChannelJudge has it
-
-}  // namespace
 
 void RunTime::OnMessage(int64_t utime, const std::optional<Seal>& seal, int64_t date, int64_t now) {
   if (utime < 0 || !IsTime(utime)) return;
   utime_ = std::max(utime_, utime);  // processes' words come a little out of order
   if (seal) {
-    heard_ = seal->process == 0            ? Kind::kVirtual
-             : seal->counter < date - kOld ? Kind::kReplay
-                                           : Kind::kReal;
+    heard_ = seal->process == 0                             ? Kind::kVirtual
+             : seal->counter < date - ChannelJudge::kOldest ? Kind::kReplay
+                                                            : Kind::kReal;
   }
   if (moments_.empty() || now >= moments_.back().now + kStep) moments_.push_back({now, utime_});
 }

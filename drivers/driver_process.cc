@@ -16,8 +16,6 @@ namespace {
 
 constexpr int64_t kStatusPeriod = 100'000;  // [us]
 constexpr int64_t kReopenPeriod = 100'000;  // [us]
-// [s] real time that the drives have to confirm a disarm at the end
-constexpr double kDisarmTimeout = 0.3;
 // of frames per wake: a flood must not keep us from our deadlines
 constexpr int kBursts = 8;
 constexpr int64_t kFlight = int64_t{kFlightSeconds} * 1'000'000;  // [us]
@@ -57,7 +55,8 @@ DriverProcess::DriverProcess(Process& process, const RobotDescription& robot,
           [this](const driver_request_t& request, std::string_view why) {
             OnForgedRequest(request, why);
           }),
-      log_(STDERR_FILENO, WriteState) {
+      log_(STDERR_FILENO, WriteState),
+      disarm_patience_(Microseconds(DisarmPatience(robot.driver) * std::max(1.0, clock_.scale()))) {
   for (const RobotBus& bus : buses_) fds_.push_back(bus.transport->fd());
   accepted_.resize(buses_.size());
   stats_.resize(buses_.size());
@@ -205,7 +204,6 @@ void DriverProcess::PublishStatus() {
 
 int DriverProcess::DisarmAndStop(std::string_view why) {
   driver_.End(why, clock_.Now(), clock_.Utime());
-  const auto patience = Microseconds(kDisarmTimeout * clock_.scale());
   const int64_t begin = clock_.Now();
   do {
     try {
@@ -215,7 +213,7 @@ int DriverProcess::DisarmAndStop(std::string_view why) {
       // stands still: no time passes.
       if (!deaf_ || clock_.is_virtual()) throw;
     }
-  } while (!driver_.confirmed_idle() && clock_.Now() - begin < patience);
+  } while (!driver_.confirmed_idle() && clock_.Now() - begin < disarm_patience_);
   PublishStatus();  // the last word: nothing is sent after it
   log_.Drain();
   const bool idle = driver_.confirmed_idle();

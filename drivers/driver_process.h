@@ -75,7 +75,8 @@ class DriverProcess {
   int64_t next_reopen_ = 0;
   int64_t next_status_ = 0;
   uint64_t revision_ = 0;
-  StateLog log_;  // to stderr
+  StateLog log_;             // to stderr
+  int64_t disarm_patience_;  // [us] of scaled time, and of real time no less
 };
 
 }  // namespace plumb

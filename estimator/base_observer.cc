@@ -162,7 +162,8 @@ void BaseObserver::Read(int64_t utime, const ImuInbox::Reading& reading) {
   }
   odometry_.Tell(smoother_);
   odometry_.Predict(elapsed, Eigen::Map<const Vector3d>(reading.rate.data()),
-                    Eigen::Map<const Vector3d>(reading.force.data()), reading.clipped);
+                    Eigen::Map<const Vector3d>(reading.force.data()),
+                    {.rate = reading.rate_clipped, .force = reading.force_clipped});
   odometry_.Correct(feet_);
   if (!odometry_.finite()) return Restart();
   smoother_.Keep(utime_, odometry_);

@@ -39,7 +39,8 @@ ImuInbox::Verdict ImuInbox::Put(const imu_t& imu, int64_t state_utime) {
   std::copy(std::begin(imu.force), std::end(imu.force), reading.force.begin());
   std::copy(std::begin(imu.orientation), std::end(imu.orientation), reading.orientation.begin());
   reading.orientation_valid = imu.orientation_valid;
-  reading.clipped = imu.clipped;
+  reading.rate_clipped = imu.rate_clipped;
+  reading.force_clipped = imu.force_clipped;
   const bool late = imu.utime < newest_;
   newest_ = std::max(newest_, imu.utime);
   return late ? Verdict::kReordered : Verdict::kTaken;

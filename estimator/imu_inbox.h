@@ -22,7 +22,7 @@ class ImuInbox {
     int64_t utime;
     std::array<double, 3> rate, force;
     std::array<double, 4> orientation;
-    bool orientation_valid, clipped;
+    bool orientation_valid, rate_clipped, force_clipped;
   };
   enum class Verdict { kTaken, kReordered, kDuplicate, kRefused };
 

@@ -1,4 +1,5 @@
 #include "estimator/leg_odometry.h"
+#include "estimator/kinematic_filter.h"
 #include "estimator/leg_smoother.h"
 #include "estimator/square.h"
 
@@ -18,7 +19,6 @@ using Eigen::Vector3d;
 constexpr double kStandsHeightSd = 0.04, kStandsVelocitySd = 0.2;  // [m], [m/s]
 constexpr double kMovesHeightSd = 0.2, kMovesVelocitySd = 3;
 // [s] in which a bias may wander by as much as it may be at the start
-constexpr double kBiasWanders = 100;
 constexpr double kFootSd = 1e-3;   // [m] play and elasticity of a leg
 constexpr double kSlipped = 16.3;  // chi-square with three degrees of freedom: 99.9 %
 // [s] over which the force on the body is averaged
@@ -28,11 +28,12 @@ constexpr double kLongFlight = 0.5;
 // Share of its weight from which on a body that flies for long is held up. Legs that swing pull and
 // push it by half of that and more.
 constexpr double kHeldUp = 0.9;
-// Share of what an accelerometer can measure by which an impact's force, as a rule, is beyond it.
+// Share of what a sensor can measure by which an impact's force, or a rate, as a rule is beyond it.
 constexpr double kBeyond = 0.1;
 
-// [m/s^2] by which the force may be beyond what was read of it.
-Vector3d Beyond(const Vector3d& reading) {
+// By how much what a reading has clipped may be beyond it.
+Vector3d Beyond(const Vector3d& reading, bool clipped) {
+  if (!clipped) return Vector3d::Zero();
   Eigen::Index axis;
   reading.cwiseAbs().maxCoeff(&axis);
   return kBeyond * reading[axis] * Vector3d::Unit(axis);
@@ -96,7 +97,7 @@ void LegOdometry::Restart(Beginning beginning, const Vector3d& position,
       Square(s_.acceleration_bias_sd) * in_body * allowed_ * in_body.transpose();
 }
 
-void LegOdometry::Predict(double dt, const Vector3d& rate, const Vector3d& force, bool clipped) {
+void LegOdometry::Predict(double dt, const Vector3d& rate, const Vector3d& force, Clipped clipped) {
   const Matrix3d start = orientation_.toRotationMatrix();
   const Vector3d in_plane = start.transpose() * allowed_turn_ * start * rate;
   const Vector3d last_rate = force_ ? rate_ : in_plane;
@@ -142,8 +143,8 @@ void LegOdometry::Predict(double dt, const Vector3d& rate, const Vector3d& force
   // period the force of an impact acted is not known, nor when the rate changed: anywhere in it.
   const double periods = std::max(1.0, dt / s_.period);
   const double within = Square(acceleration_change_ * dt * dt) / 12;
-  const Vector3d unread =
-      clipped ? Vector3d(dt * (allowed_ * (half * Beyond(force)))) : Vector3d(Vector3d::Zero());
+  const Vector3d unread = dt * (allowed_ * (half * Beyond(force, clipped.force))),
+                 unturned = dt * (allowed_turn_ * (half * Beyond(rate, clipped.rate)));
   const Matrix3d velocity =
       Square(s_.acceleration_sd * dt * periods) * allowed_ + unread * unread.transpose();
   p.block<3, 3>(kVelocity, kVelocity) += velocity;
@@ -151,12 +152,14 @@ void LegOdometry::Predict(double dt, const Vector3d& rate, const Vector3d& force
   p.block<3, 3>(kPosition, kVelocity) += dt / 2 * velocity;
   p.block<3, 3>(kVelocity, kPosition) += dt / 2 * velocity;
   p.block<3, 3>(kAngle, kAngle) +=
-      (Square(s_.rate_sd * dt * periods) + Square(rate_change_ * dt) / 12) * allowed_turn_;
+      (Square(s_.rate_sd * dt * periods) + Square(rate_change_ * dt) / 12) * allowed_turn_ +
+      unturned * unturned.transpose();
   const Matrix3d turns = half.transpose() * allowed_turn_ * half,
                  moves = half.transpose() * allowed_ * half;
-  p.block<3, 3>(kRateBias, kRateBias) += Square(s_.rate_bias_sd) * dt / kBiasWanders * turns;
+  p.block<3, 3>(kRateBias, kRateBias) +=
+      Square(s_.rate_bias_sd) * dt / KinematicFilter::kBiasWanders * turns;
   p.block<3, 3>(kAccelerationBias, kAccelerationBias) +=
-      Square(s_.acceleration_bias_sd) * dt / kBiasWanders * moves;
+      Square(s_.acceleration_bias_sd) * dt / KinematicFilter::kBiasWanders * moves;
 }
 
 void LegOdometry::Correct(std::span<const Foot> feet) {

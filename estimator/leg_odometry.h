@@ -71,11 +71,14 @@ class LegOdometry {
   /// world's. @param feet num_feet.
   void Restart(Beginning beginning, const Eigen::Vector3d& position,
                const Eigen::Quaterniond& orientation, std::span<const Foot> feet);
+  struct Clipped {
+    bool rate, force;
+  };
   /// @param dt [s] > 0 since the last reading. @param rate [rad/s], force [m/s^2], averaged over
-  /// them, in the body's axes. @param clipped the force may be greater than was read, on its
-  /// greatest axis.
+  /// them, in the body's axes. @param clipped what may be greater than was read, on its greatest
+  /// axis.
   void Predict(double dt, const Eigen::Vector3d& rate, const Eigen::Vector3d& force,
-               bool clipped = false);
+               Clipped clipped = {false, false});
   /// Judges which feet rest, and takes the places of those into account. @param feet at the time of
   /// the last reading.
   void Correct(std::span<const Foot> feet);

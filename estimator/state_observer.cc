@@ -13,7 +13,8 @@ namespace {
 
 // [us]; beyond it nothing is known of the motion in between
 constexpr int64_t kLongestGap = 1'000'000;
-constexpr int64_t kMaxAhead = 10'000;  // [us] of a joint's reading before the others
+// [us] of a joint's reading before the others; a sensor's may be half a measurement period ahead
+constexpr int64_t kMostAhead = 10'000;
 // [s] of a drive's velocity estimate: twice that of an ODrive as it comes
 constexpr double kVelocityLag = 4e-3;
 constexpr double kBiasesInOrder = 5;     // times its sd
@@ -37,6 +38,7 @@ StateObserver::StateObserver(const RobotDescription& robot)
       lag_(robot.estimator.lag),
       gravity_(robot.simulation.gravity),
       greatest_effort_(GreatestEffort(robot)),
+      most_ahead_(std::max(kMostAhead, Microseconds(robot.driver.measurement / 2))),
       unknown_step_(2 * robot.effort_limits().maxCoeff()),
       contact_(robot) {
   if (robot.estimator.base == EstimatorSettings::Base::kLegs) base_.emplace(robot);
@@ -97,10 +99,11 @@ StateObserver::Use StateObserver::Judge(const joint_state_t& measured) const {
         !within(measured.effort_applied[i], greatest_effort_) ||
         !within(measured.effort_sent[i], greatest_effort_))
       return Use::kRefuse;
-    if (!measured.valid[i]) continue;
     const int64_t t = measured.measured[i];
+    if (!IsTime(t)) return Use::kRefuse;
+    if (!measured.valid[i]) continue;
     const bool of_that_time =
-        t >= 0 && IsTime(t) && t - measured.utime <= kMaxAhead && measured.utime - t <= kLongestGap;
+        t >= 0 && t - measured.utime <= most_ahead_ && measured.utime - t <= kLongestGap;
     if (!of_that_time || !IsPhysical(measured.position[i])) return Use::kRefuse;
   }
   if (!started_) return Use::kUse;

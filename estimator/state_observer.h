@@ -136,6 +136,7 @@ class StateObserver {
   std::vector<Imu> imus_;
   std::optional<BaseObserver> base_;
   double greatest_effort_;  // [Nm] or [N] that a motor may have
+  int64_t most_ahead_;      // [us] that a joint's reading may be of after the others
   // [Nm] or [N] assumed change of an effort that is not known: from full one way to full the other
   double unknown_step_;
   GroundContact contact_;

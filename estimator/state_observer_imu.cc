@@ -62,9 +62,8 @@ bool StateObserver::UseImu(Imu& imu, const ImuInbox::Reading& reading,
   const double age = Seconds(late) + imu.delay;
   const double elapsed = imu.used < 0 ? 0 : Seconds(reading.utime - imu.used);
   imu.used = std::max(imu.used, reading.utime);
-  if (reading.clipped && !imu.of_base) return false;
   if (imu.of_base) return UseForBase(reading, measured.utime, Microseconds(imu.delay));
-  if (imu.mounting.turned >= 0) {
+  if (imu.mounting.turned >= 0 && !reading.rate_clipped) {
     // JOINT_STATE has the last reading of each of its periods; those in between, only we have.
     const auto turned = static_cast<size_t>(imu.mounting.turned);
     Joint& joint = joints_[turned];
@@ -75,7 +74,8 @@ bool StateObserver::UseImu(Imu& imu, const ImuInbox::Reading& reading,
               imu.mounting.axis.dot(Eigen::Map<const Eigen::Vector3d>(reading.rate.data())), age);
     }
   }
-  if (imu.mounting.slides.empty() || !reading.orientation_valid) return false;
+  if (imu.mounting.slides.empty() || !reading.orientation_valid || reading.force_clipped)
+    return false;
   const auto& [w, x, y, z] = reading.orientation;
   // As the joints have it: neither a wrong heading nor a boom's roll matter.
   const Eigen::Quaterniond turn =

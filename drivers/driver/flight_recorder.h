@@ -61,7 +61,7 @@ class FlightRecorder {
   std::string name_, bus_;
   Report report_;
   Tape tapes_[2];
-  int recording_ = 0;  // the other one is the writer's while busy_
+  int recording_ = 0;  // the other one is the writer's while task_ is kWrite
   int64_t since_ = 0, utime_ = 0;
   Reason reason_;
   enum Task : int { kNone, kWrite, kStop };

@@ -116,7 +116,8 @@ const imu_t* JointSensor::NextImu() noexcept {
   message_.orientation[2] = link.y();
   message_.orientation[3] = link.z();
   message_.orientation_valid = sample.orientation_valid;
-  message_.clipped = sample.rate_clipped || sample.force_clipped;
+  message_.rate_clipped = sample.rate_clipped;
+  message_.force_clipped = sample.force_clipped;
   imu_samples_.Pop();
   return &message_;
 }

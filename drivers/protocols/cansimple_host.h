@@ -19,9 +19,6 @@ namespace plumb {
 std::unique_ptr<Motor> MakeCanSimpleMotor(const MotorDescription& description,
                                           const MotorTiming& timing);
 
-/// Heartbeats that are expected within heartbeat_timeout: with the factory's 100 ms, 0.5 s.
-inline constexpr int kBeatsPerTimeout = 5;
-
 /// The messages between such a drive and its host, the drive configured to send heartbeats with a
 /// fifth of heartbeat_timeout and encoder estimates with `measurement`; all else on request,
 /// temperatures and its supply every `telemetry`.

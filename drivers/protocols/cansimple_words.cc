@@ -2,37 +2,34 @@
 #include <array>
 
 #include "drivers/protocols/cansimple.h"
+#include "drivers/protocols/error_words.h"
 
 namespace plumb::cansimple {
 namespace {
 
-struct ErrorWord {
-  int bit;
-  std::string_view words;
-};
 constexpr ErrorWord kErrorWords[] = {
-    {0, "initializing"},
-    {1, "system level error"},
-    {2, "timing error"},
-    {3, "missing estimate"},
-    {4, "bad configuration"},
-    {5, "gate driver fault"},
-    {6, "missing input"},
-    {8, "DC bus over-voltage"},
-    {9, "DC bus under-voltage"},
-    {10, "DC bus over-current"},
-    {11, "DC bus over-regeneration current"},
-    {12, "current limit violation"},
-    {13, "motor over-temperature"},
-    {14, "inverter over-temperature"},
-    {15, "velocity limit violation"},
-    {16, "position limit violation"},
-    {24, "watchdog timer expired"},
-    {25, "estop requested"},
-    {26, "spinout detected"},
-    {27, "brake resistor disarmed"},
-    {28, "thermistor disconnected"},
-    {30, "calibration error"},
+    {1u << 0, "initializing"},
+    {1u << 1, "system level error"},
+    {1u << 2, "timing error"},
+    {1u << 3, "missing estimate"},
+    {1u << 4, "bad configuration"},
+    {1u << 5, "gate driver fault"},
+    {1u << 6, "missing input"},
+    {1u << 8, "DC bus over-voltage"},
+    {1u << 9, "DC bus under-voltage"},
+    {1u << 10, "DC bus over-current"},
+    {1u << 11, "DC bus over-regeneration current"},
+    {1u << 12, "current limit violation"},
+    {1u << 13, "motor over-temperature"},
+    {1u << 14, "inverter over-temperature"},
+    {1u << 15, "velocity limit violation"},
+    {1u << 16, "position limit violation"},
+    {1u << 24, "watchdog timer expired"},
+    {1u << 25, "estop requested"},
+    {1u << 26, "spinout detected"},
+    {1u << 27, "brake resistor disarmed"},
+    {1u << 28, "thermistor disconnected"},
+    {1u << 30, "calibration error"},
 };
 
 constexpr std::array<std::string_view, 17> kStates = {"UNDEFINED",
@@ -73,21 +70,7 @@ constexpr std::array<std::string_view, 16> kResults = {"success",
 }  // namespace
 
 std::string_view DescribeErrors(uint32_t errors, std::span<char> buffer) noexcept {
-  if (errors == 0) return "no error";
-  size_t size = 0;
-  const auto append = [&](std::string_view words) {
-    for (const char c : words) {
-      if (size < buffer.size()) buffer[size++] = c;
-    }
-  };
-  for (const ErrorWord& error : kErrorWords) {
-    if ((errors >> error.bit & 1) == 0) continue;
-    if (size > 0) append(", ");
-    append(error.words);
-    errors &= ~(1u << error.bit);
-  }
-  if (errors != 0) append(size > 0 ? ", unknown error" : "unknown error");
-  return {buffer.data(), size};
+  return DescribeBits(errors, kErrorWords, buffer);
 }
 
 std::string_view DescribeAxisState(int state) noexcept {

@@ -133,12 +133,12 @@ class MitMotor : public AnsweringMotor<Step> {
     const bool displaced = std::exchange(displaced_, false);
     const bool silent = !present() || dt > heartbeat_timeout();
     raw_ = raw;
-    if (!heard() || (silent && displaced)) {
+    if (!heard() || displaced) {
       estimate_.position = raw;
       return;
     }
     const double explained = silent ? kUnmoved : ranges_.velocity * (Seconds(dt) + kUneven);
-    if (!displaced && std::abs(step) > explained) {
+    if (std::abs(step) > explained) {
       LosePlace();
       Fail(now,
            "its position jumped by {:.3g} rad in {:.3g} ms: it has restarted, or lost its place",

@@ -185,7 +185,7 @@ class XsensImu : public Sensor {
       for (double& q : next_.orientation) q /= std::sqrt(square);
     }
     next_.orientation_valid = unit && (status_ & kOrientationValid) != 0;
-    const uint32_t axes = status_ & (kForceAxes | kRateAxes);
+    const uint32_t axes = status_ & (kForceAxes | kRateAxes | kFieldAxes);
     const bool somewhere = (status_ & kClippingDetected) != 0 && axes == 0;
     next_.rate_clipped = somewhere || (axes & kRateAxes) != 0 || AtItsEnd(kRateOfTurn, next_.rate);
     next_.force_clipped =

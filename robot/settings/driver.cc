@@ -8,6 +8,10 @@
 
 namespace plumb {
 
+double DisarmPatience(const DriverSettings& driver) {
+  return std::max(0.3, 1.5 * driver.heartbeat_timeout / kBeatsPerTimeout);
+}
+
 DriverSettings ReadDriver(Config config, const std::vector<JointDescription>& joints) {
   DriverSettings s;
   s.cycle = config.Number("cycle", {1e-4, 1});

@@ -35,18 +35,15 @@ TEST_CASE("time goes on") {
   CHECK(clock.Utime() >= utime);
 }
 
-TEST_CASE("absolute deadlines do not drift, missed ones are skipped and counted") {
+TEST_CASE("absolute deadlines do not drift, missed ones are skipped") {
   Periodic periodic(100, 1000);
   CHECK(periodic.Remaining(1000) == 100);
   CHECK_FALSE(periodic.Due(1099));
   CHECK(periodic.Due(1100));
   CHECK(periodic.Advance(1130) == 30);  // late, but the next deadline stays at 1200
   CHECK(periodic.Remaining(1130) == 70);
-  CHECK(periodic.overruns() == 0);
   CHECK(periodic.Advance(1520) == 320);  // 1300, 1400, 1500 were missed
-  CHECK(periodic.overruns() == 3);
   CHECK(periodic.Remaining(1520) == 80);
-  CHECK(periodic.cycles() == 2);
 }
 
 TEST_CASE("virtual time is what it is told to be, everywhere the same") {

@@ -115,7 +115,7 @@ void Clip(Recordings& recordings, double end) {
     for (SimulatedReadings::Sample& sample : recording) {
       for (imu_t& imu : sample.imus) {
         for (double& force : imu.force) {
-          imu.clipped = imu.clipped || std::abs(force) > end;
+          imu.force_clipped = imu.force_clipped || std::abs(force) > end;
           force = std::clamp(force, -end, end);
         }
       }

@@ -221,13 +221,29 @@ TEST_CASE("a force that is beyond what can be read is not well known") {
   LegOdometry filter = walker.filter, exact = filter;
   const Vector3d up = Vector3d::UnitZ(), across = Vector3d::UnitX(), read = 100 * up;
   for (int i = 0; i < 3; ++i) {
-    filter.Predict(kPeriod, Vector3d::Zero(), read, true);
+    filter.Predict(kPeriod, Vector3d::Zero(), read, {.rate = false, .force = true});
     exact.Predict(kPeriod, Vector3d::Zero(), read);
   }
   CHECK((filter.velocity() - exact.velocity()).norm() < 1e-9);
   const double unread = std::sqrt(3) * 0.1 * 100 * kPeriod;
   CHECK(filter.velocity_sd(up) == Approx(std::hypot(exact.velocity_sd(up), unread)).epsilon(1e-3));
   CHECK(filter.velocity_sd(across) == Approx(exact.velocity_sd(across)).epsilon(0.02));
+}
+
+TEST_CASE("nor is a rate, and the force that was felt with it is as good as ever") {
+  Walker walker(9, 2);
+  walker.sway = 0;
+  walker.Start();
+  walker.Run(1);
+  LegOdometry filter = walker.filter, exact = filter;
+  const Vector3d x = Vector3d::UnitX(), y = Vector3d::UnitY(), read = 35 * x,
+                 force = kGravity * Vector3d::UnitZ();
+  filter.Predict(kPeriod, read, force, {.rate = true, .force = false});
+  exact.Predict(kPeriod, read, force);
+  const double unturned = 0.1 * 35 * kPeriod;
+  CHECK(filter.angle_sd(x) == Approx(std::hypot(exact.angle_sd(x), unturned)).epsilon(1e-3));
+  CHECK(filter.angle_sd(y) == Approx(exact.angle_sd(y)).epsilon(0.02));
+  CHECK(filter.velocity_sd(x) == Approx(exact.velocity_sd(x)));
 }
 
 TEST_CASE("in a plane nothing leaves it") {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <limits>
 
 #include "common/random.h"
 #include "common/special_numbers.h"
@@ -45,6 +46,35 @@ imu_t StillImu(const RobotDescription& robot, int64_t k) {
   imu.orientation[0] = 1;
   imu.orientation_valid = true;
   return imu;
+}
+
+TEST_CASE("a time that is none is refused, also of a joint that was not measured") {
+  const RobotDescription robot = LoadPendulum("robot.toml");
+  for (const int64_t forged :
+       {std::numeric_limits<int64_t>::max(), std::numeric_limits<int64_t>::min()}) {
+    StateObserver observer(robot);
+    for (int k = 0; k < 10; ++k) REQUIRE(observer.OnJointState(Still(robot, k)));
+    joint_state_t m = Still(robot, 10);
+    m.valid[0] = 0, m.measured[0] = forged;
+    CHECK_FALSE(observer.OnJointState(m));
+    CHECK(observer.OnJointState(Still(robot, 11)));
+  }
+}
+
+TEST_CASE("a sensor's reading may be half a measurement period ahead") {
+  RobotDescription robot = LoadPendulum("robot.toml");
+  const auto accepts = [&](int64_t ahead) {
+    StateObserver observer(robot);
+    for (int k = 0; k < 10; ++k) REQUIRE(observer.OnJointState(Still(robot, k)));
+    joint_state_t m = Still(robot, 10);
+    m.measured[0] += ahead;
+    return observer.OnJointState(m);
+  };
+  CHECK(accepts(9'000));
+  CHECK_FALSE(accepts(20'000));
+  robot.driver.measurement = 0.05;
+  CHECK(accepts(20'000));
+  CHECK_FALSE(accepts(26'000));
 }
 
 TEST_CASE(

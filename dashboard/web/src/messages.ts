@@ -153,7 +153,8 @@ export interface imu_t {
   force: (number | null)[];
   orientation: (number | null)[];
   orientation_valid: boolean;
-  clipped: boolean;
+  rate_clipped: boolean;
+  force_clipped: boolean;
 }
 
 export interface joint_command_t {

@@ -115,7 +115,7 @@ TEST_CASE("errors in words") {
   CHECK(DescribeErrors(kWatchdogTimerExpired, buffer) == "watchdog timer expired");
   CHECK(DescribeErrors(kWatchdogTimerExpired | kEstopRequested, buffer) ==
         "watchdog timer expired, estop requested");
-  CHECK(DescribeErrors(1u << 31, buffer) == "unknown error");
+  CHECK(DescribeErrors(1u << 31, buffer) == "an unknown error");
   CHECK(DescribeErrors(~0u, buffer).size() == 64);  // cut, not overrun
   CHECK(DescribeAxisState(1) == "IDLE");
   CHECK(DescribeAxisState(-1) == "unknown state");

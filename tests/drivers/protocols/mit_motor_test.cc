@@ -147,6 +147,18 @@ TEST_CASE("a restart, seen by its position, is a fault") {
   CHECK_FALSE(bench.device.armed());
 }
 
+TEST_CASE("where a virtual robot is placed its turns begin anew") {
+  Bench bench;
+  bench.sample.velocity = 40;
+  bench.Run(500);  // beyond what a reply can say
+  REQUIRE(bench.motor->estimate().position > 13);
+  bench.sample.velocity = 0, bench.sample.position = 1;
+  bench.motor->Displaced();
+  bench.Run(10);
+  CHECK(bench.motor->estimate().position == Approx(1).margin(2e-3));
+  CHECK_FALSE(bench.motor->lost_place());
+}
+
 TEST_CASE("turns survive a silence only where the motor has not moved meanwhile") {
   Bench bench;
   bench.sample.velocity = 40;

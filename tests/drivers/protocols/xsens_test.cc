@@ -191,6 +191,10 @@ TEST_CASE("the status word says what a sample is worth") {
   bench.Run(10);
   CHECK(bench.sensor->imu()->rate_clipped);
   CHECK(bench.sensor->imu()->force_clipped);
+  bench.sample.status = kOrientationValid | kClippingDetected | 1u << 15;  // the magnetometer
+  bench.Run(10);
+  CHECK_FALSE(bench.sensor->imu()->rate_clipped);
+  CHECK_FALSE(bench.sensor->imu()->force_clipped);
   bench.sample.status = kOrientationValid | kClippingDetected | 1u << 9;
   bench.Run(10);
   CHECK_FALSE(bench.sensor->imu()->rate_clipped);
