@@ -51,9 +51,10 @@ struct LockstepBus {
   int patience = 100;
 };
 
-/// A connection to a CAN bus. Send and Receive do not block, throw or allocate, but for loop: and in
-/// virtual time, and one's own frames are not received. None waits by a clock of its own; where frames wait for a time (faulty:,
-/// replay:), SetTime tells it and NextEvent says when to come again. Not thread-safe.
+/// A connection to a CAN bus. Send and Receive do not block, throw or allocate, but for loop: and
+/// in virtual time, and one's own frames are not received. None waits by a clock of its own; where
+/// frames wait for a time (faulty:, replay:), SetTime tells it and NextEvent says when to come
+/// again. Not thread-safe.
 class Transport {
  public:
   virtual ~Transport() = default;

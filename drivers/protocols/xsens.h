@@ -43,8 +43,8 @@ inline constexpr Layout kAcceleration{0x34, "Acceleration", 6,
 
 /// Bits of StatusWord. The self-test bit is not among those an MTi-600 reports.
 inline constexpr uint32_t kOrientationValid = 0x02;
-/// Of the accelerometer's, the gyroscope's and the magnetometer's first axis; those of the other two
-/// follow.
+/// Of the accelerometer's, the gyroscope's and the magnetometer's first axis; those of the other
+/// two follow.
 inline constexpr uint32_t kClippedForce = 0x100, kClippedRate = 0x800, kClippedField = 0x4000;
 inline constexpr uint32_t kForceAxes = 7 * kClippedForce, kRateAxes = 7 * kClippedRate,
                           kFieldAxes = 7 * kClippedField;

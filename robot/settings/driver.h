@@ -33,7 +33,7 @@ struct DriverSettings {
   double stuck_after = 0;
 };
 
-/// Heartbeats that are expected of a drive within heartbeat_timeout: with an ODrive's 100 ms, 0.5 s.
+/// Heartbeats that are expected of a drive within heartbeat_timeout: with an ODrive's 100 ms 0.5 s.
 inline constexpr int kBeatsPerTimeout = 5;
 
 /// [s] that drives have to confirm that they are idle when the driver ends: some do by their next
