@@ -80,7 +80,7 @@ MethodResult ByApproximation(const MethodInput& input, const std::string& name,
                   posterior.simulations, input.options.discrepancy, how);
   if (every > 1)
     result.warnings.push_back(fmt::format(
-        "{} looks at each {}th transition only, to try enough simulators within its budget", name,
+        "{} looks at every {}th transition only, to try enough simulators within its budget", name,
         every));
   if (simulations < kFewestSimulators)
     result.warnings.push_back(fmt::format(

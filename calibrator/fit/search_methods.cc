@@ -51,9 +51,9 @@ MethodResult Reps(const MethodInput& input) {
   MethodResult result = FromSearch(input, run, "reps");
   result.simulated_steps = errors.simulated_steps();
   if (every > 1) {
-    result.warnings.push_back(
-        fmt::format("reps looks at each {}th transition only, to make {} updates within its budget",
-                    every, updates));
+    result.warnings.push_back(fmt::format(
+        "reps looks at every {}th transition only, to make {} updates within its budget", every,
+        updates));
   }
   if (run.temperature > 1.5)
     result.warnings.push_back(

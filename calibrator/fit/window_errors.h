@@ -44,7 +44,7 @@ class WindowErrors {
     int coordinate;           ///< 0 ... n - 1: of q's differences, n ... 2 n - 1: of v
   };
 
-  /// @param rollouts must outlive this. @param every k: only each k-th window is kept; >= 1.
+  /// @param rollouts must outlive this. @param every k: only every k-th window is kept; >= 1.
   /// @throws std::invalid_argument if there is no transition with an observed end.
   WindowErrors(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts, int horizon,
                ExecutionOptions execution, int every = 1);
