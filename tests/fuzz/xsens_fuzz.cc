@@ -58,8 +58,11 @@ class Imu : public VirtualSensor {
     for (size_t i = 0; i < 4 && imu.orientation_valid; ++i) {
       same = same && near(imu.orientation[i], sample_.orientation[i], 2e-3);
     }
-    const bool any = (sample_.status & (kForceAxes | kRateAxes | kClippingDetected)) != 0;
-    return same && (imu.rate_clipped || imu.force_clipped) == any;
+    // The word may say of which axes, or only that there are some.
+    const uint32_t axes = sample_.status & (kForceAxes | kRateAxes | kFieldAxes);
+    const bool some = (sample_.status & kClippingDetected) != 0 && axes == 0;
+    return same && imu.rate_clipped == (some || (axes & kRateAxes) != 0) &&
+           imu.force_clipped == (some || (axes & kForceAxes) != 0);
   }
 
  private:
