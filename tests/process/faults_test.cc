@@ -236,10 +236,14 @@ TEST_CASE("the driver disarms when it is asked to stop") {
 TEST_CASE("the driver waits for drives that say by their next heartbeat that they are idle") {
   Stage stage(16);
   const std::filesystem::path file = stage.folder / "robot.toml";
-  std::ofstream(file) << "extends = \"" << stage.robot_folder << "/robot.toml\"\n[robot]\nurdf = \""
-                      << stage.robot_folder << "/robot.urdf\"\n[driver]\nheartbeat_timeout = 5\n";
+  std::ofstream(file)
+      << "extends = \"" << stage.robot_folder << "/robot.toml\"\n[robot]\nurdf = \""
+      << stage.robot_folder
+      << "/robot.urdf\"\n[driver]\nheartbeat_timeout = 5\n[virtual_robot]\nheartbeat = 1\n";
   stage.robot_folder = file;
-  stage.RunWithTorque();  // heartbeats come once a second
+  stage.RunWithTorque();
+  stage.axis_state = -1;
+  REQUIRE(stage.WaitUntil([&] { return stage.axis_state != -1; }, 5));  // a second to the next
   stage.coordinator->Stop("plumb-driver");
   REQUIRE(stage.WaitUntil([&] { return !stage.coordinator->present("plumb-driver"); }, 10));
   CHECK(stage.children.at("plumb-driver")->WaitFor(60));
