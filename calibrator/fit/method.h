@@ -71,8 +71,8 @@ CurriculumOptions CurriculumOptionsOf(const MethodInput& input);
 /// The result of `laplace`.
 MethodResult FromCurriculum(const MethodInput& input, CurriculumFit curriculum);
 
-/// k, if only every k-th transition may be looked at so that a search within the budget gets as many
-/// simulators as it needs.
+/// k, if only every k-th transition may be looked at so that a search within the budget gets as
+/// many simulators as it needs.
 int EveryFor(const MethodInput& input, int64_t simulators);
 
 }  // namespace plumb
