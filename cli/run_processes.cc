@@ -140,7 +140,8 @@ void RunProcesses::Stop(bool hurry) noexcept {
 /// Everything that could command ends at one moment; the driver disarms and confirms; the robot
 /// goes last.
 void RunProcesses::StopInVirtualTime(bool hurry) {
-  constexpr int64_t kStopTimeout = 1'000'000, kSlice = 10'000;  // [us]
+  constexpr int64_t kSlice = 10'000;  // [us]
+  const int64_t timeout = Microseconds(disarm_patience_ + 0.7);
   const auto start = SteadyClock::now();
   const auto in_time = [&] { return !hurry || SecondsSince(start) < patience_; };
   coordinator_->go_on = in_time;
@@ -153,7 +154,7 @@ void RunProcesses::StopInVirtualTime(bool hurry) {
     for (const Child& child : children_) {
       if (whom(child)) coordinator_->Stop(child.name());
     }
-    const int64_t deadline = coordinator_->now() + kStopTimeout;
+    const int64_t deadline = coordinator_->now() + timeout;
     while (anybody(whom) && coordinator_->now() < deadline && in_time()) {
       coordinator_->participant().Wait(coordinator_->now() + kSlice, Participant::Wake::kOnTime);
     }

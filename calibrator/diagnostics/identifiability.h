@@ -64,7 +64,7 @@ Eigen::MatrixXd StepInformation(const RobotDescription& robot, Discrepancy& disc
                                 std::span<const Rollout> rollouts,
                                 const Eigen::VectorXd& coordinates, const Eigen::VectorXd& h);
 
-/// The same with that information at `distribution.mean`.
+/// FindIdentifiability with the information of single steps at `distribution.mean`.
 Identifiability FindIdentifiability(const RobotDescription& robot, Discrepancy& discrepancy,
                                     std::span<const Rollout> rollouts,
                                     const Gaussian& distribution);
