@@ -39,7 +39,7 @@ std::vector<std::string> UnreadJoints(const RobotDescription& robot,
                                       std::span<const std::string> differenced);
 
 /// For what compares single control steps, which need velocities that were read.
-/// @param who compares, to begin a sentence with. @throws std::invalid_argument where UnreadJoints
+/// @param who is compared, for the sentence. @throws std::invalid_argument where UnreadJoints
 /// has some of a log: the log, and the joints. Thread-safe.
 void RequireVelocities(const RobotDescription& robot, std::span<const Log> logs,
                        const std::string& who);
