@@ -8,6 +8,7 @@
 
 #include "common/special_numbers.h"
 #include "common/time_units.h"
+#include "estimator/moved_by_hand.h"
 #include "robot/rotation_vector.h"
 #include "robot/twist_angle.h"
 
@@ -17,7 +18,6 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kLate = 1e-6 * ImuInbox::kLatest;                            // [s]
-constexpr double kSurelyApart = 5;                                            // standard deviations
 constexpr double kHeightKnown = 0.1, kTiltKnown = 0.1, kVelocityKnown = 0.5;  // [m], [rad], [m/s]
 
 // [kg] of all that the base carries, and of itself.
@@ -134,7 +134,7 @@ bool BaseObserver::Moved(const ImuInbox::Reading& reading) const {
                  measured =
                      Eigen::Quaterniond(w, x, y, z).normalized().conjugate() * Vector3d::UnitZ();
   const double apart = std::atan2(up.cross(measured).norm(), up.dot(measured));
-  return apart > std::max(reset_after_, kSurelyApart * std::hypot(TiltSd(), measured_angle_sd_));
+  return MovedByHand(apart, reset_after_, std::hypot(TiltSd(), measured_angle_sd_));
 }
 
 void BaseObserver::Read(int64_t utime, const ImuInbox::Reading& reading) {

@@ -1,16 +1,15 @@
 // Of state_observer.h: when the filter restarts, and from where.
 
-#include <algorithm>
 #include <cmath>
 
 #include "common/special_numbers.h"
+#include "estimator/moved_by_hand.h"
 #include "estimator/state_observer.h"
 
 namespace plumb {
 namespace {
 
 constexpr int64_t kPlacing = 50'000;  // [us] until readings have told that the robot is elsewhere
-constexpr double kSurely = 5;         // standard deviations
 
 }  // namespace
 
@@ -31,9 +30,8 @@ bool StateObserver::Displaced(const joint_state_t& measured) const {
     if (joint.out) continue;
     const auto innovation =
         joint.filter.Expect(Quantity::kPosition, measured.position[i], Age(measured, i));
-    const double limit =
-        std::max(joint.settings.reset_after, kSurely * std::sqrt(innovation.variance));
-    if (std::abs(innovation.value) > limit) return true;
+    if (MovedByHand(innovation.value, joint.settings.reset_after, std::sqrt(innovation.variance)))
+      return true;
   }
   return false;
 }

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <memory>
 #include <stdexcept>
-#include <utility>
 
 #include "drivers/protocols/cansimple.h"
 #include "drivers/protocols/cansimple_motor.h"
@@ -23,10 +22,8 @@ constexpr int kBeatsToArm = 4;
 
 }  // namespace
 
-void CanSimpleMotor::Arm(int64_t now) noexcept {
-  if (step_ == Step::kArmed) return;
-  fault_ = estop_due_ = false;
-  reason_.Clear();
+void CanSimpleMotor::BeginArming(int64_t now) noexcept {
+  estop_due_ = false;
   reports_.ForgetFirmware();
   Enter(Step::kVersion, now);
 }
@@ -35,7 +32,7 @@ void CanSimpleMotor::Disarm(int64_t now) noexcept {
   disarms_ = 0;
   axis_state_known_ = false;  // an old heartbeat proves nothing
   // Nor does a new one while our order to run may be on its way: first the order to stop.
-  order_due_ = may_run_;
+  order_due_ = may_run();
   Enter(Step::kDisarming, now);
 }
 
@@ -57,18 +54,16 @@ void CanSimpleMotor::Poll(FrameBatch& out) noexcept {
 
 void CanSimpleMotor::Tick(int64_t now, bool may_arm, FrameBatch& out) noexcept {
   const size_t before = out.size();
-  present_ = heard_ && now - heartbeat_ <= timing_.heartbeat_timeout;
-  if (!present_ && heard_ && (Arming() || step_ == Step::kArmed)) {
-    Fail(now, "no heartbeat for {} ms", (now - heartbeat_) / 1000);
-  }
+  NotePresence(now);
+  if (!present() && heard() && Active()) Fail(now, "no heartbeat for {} ms", SilentFor(now));
   const auto& firmware = reports_.firmware();
-  if (step_ == Step::kVersion && present_ && firmware && Spoken(*firmware))
+  if (step() == Step::kVersion && present() && firmware && Spoken(*firmware))
     Enter(Step::kClear, now);
-  const bool late = now - entered_ >= timing_.heartbeat_timeout;
-  switch (step_) {
+  const bool late = Late(now);
+  switch (step()) {
     case Step::kRest:
       // Armed behind our back, or by a frame that was still on its way when we disarmed.
-      if (present_ && axis_state_ == kClosedLoopControl) Disarm(now);
+      if (present() && axis_state_ == kClosedLoopControl) Disarm(now);
       break;
     case Step::kVersion:
       if (firmware && !Spoken(*firmware)) {
@@ -78,7 +73,7 @@ void CanSimpleMotor::Tick(int64_t now, bool may_arm, FrameBatch& out) noexcept {
         Fail(now, "it answers, but sends no heartbeat");
       } else if (late) {
         Fail(now, "it does not answer Get_Version (firmware older than 0.6?)");
-      } else if (!firmware && may_arm && Retry(now)) {
+      } else if (!firmware && may_arm && Retry(now, kRetry)) {
         out.Push(MakeRequest(kGetVersion, node_));
       }
       break;
@@ -86,7 +81,7 @@ void CanSimpleMotor::Tick(int64_t now, bool may_arm, FrameBatch& out) noexcept {
     case Step::kMode:
     case Step::kState:
       if (late) {
-        Fail(now, "the bus has not taken its arming frames for {} ms", (now - entered_) / 1000);
+        Fail(now, "the bus has not taken its arming frames for {} ms", Since(now));
       } else if (may_arm) {
         PushArmingFrames(out);
       }
@@ -103,17 +98,12 @@ void CanSimpleMotor::Tick(int64_t now, bool may_arm, FrameBatch& out) noexcept {
       TickDisarming(now, out);
   }
   if (ask_error_) out.Push(MakeRequest(kGetError, node_));
-  given_ = out.size() > before;
+  Give(out.size() > before);
 }
 
-void CanSimpleMotor::Transmitted(bool all, int64_t now) noexcept {
-  if (!std::exchange(given_, false)) return;
-  if (!all) {
-    retry_ = now;
-    return;
-  }
+void CanSimpleMotor::OnSent(int64_t now) noexcept {
   ask_error_ = false;
-  switch (step_) {
+  switch (step()) {
     case Step::kClear:
       return Enter(Step::kMode, now);
     case Step::kMode:
@@ -131,60 +121,30 @@ void CanSimpleMotor::Transmitted(bool all, int64_t now) noexcept {
 
 Frame CanSimpleMotor::Torque(double torque) noexcept {
   const Field& field = kSetInputTorqueShort.fields[0];
-  if (!field.Holds(torque)) ++saturations_;
+  if (!field.Holds(torque)) CountSaturation();
   if (!std::isfinite(torque)) torque = 0;
   return Make(kSetInputTorqueShort, node_, {std::clamp(torque, field.lowest(), field.highest())});
-}
-
-DriveState CanSimpleMotor::state() const noexcept {
-  if (!present_) return DriveState::kAbsent;
-  if (fault_) return DriveState::kFault;
-  if (Arming()) return DriveState::kArming;
-  return step_ == Step::kArmed ? DriveState::kArmed : DriveState::kIdle;
-}
-
-std::string_view CanSimpleMotor::reason() const noexcept {
-  if (reason_.text().empty() && !present_)
-    return heard_ ? "no heartbeat any more" : "no heartbeat yet";
-  return reason_.text();
-}
-
-bool CanSimpleMotor::confirmed_idle() const noexcept {
-  return step_ == Step::kRest || (!present_ && !may_run_ && !estop_due_);
-}
-
-void CanSimpleMotor::Enter(Step step, int64_t now) noexcept {
-  step_ = step;
-  entered_ = retry_ = now;
-  beats_ = 0;
 }
 
 // A drive that has lost its power since the first mode would run in the one it wakes up in, which
 // holds a position.
 void CanSimpleMotor::PushArmingFrames(FrameBatch& out) noexcept {
   if (out.room() < 2) return;
-  if (step_ == Step::kClear) {
+  if (step() == Step::kClear) {
     out.Push(Make(kClearErrors, node_));
     return;
   }
   out.Push(Make(kSetControllerMode, node_, {kTorqueControl, kPassthrough}));
-  if (step_ == Step::kMode) return;
+  if (step() == Step::kMode) return;
   out.Push(Make(kSetAxisState, node_, {kClosedLoopControl}));
-  may_run_ = true;
-}
-
-bool CanSimpleMotor::Retry(int64_t now) noexcept {
-  if (now < retry_) return false;
-  retry_ = now + kRetry;
-  return true;
+  MayRun();
 }
 
 void CanSimpleMotor::TickDisarming(int64_t now, FrameBatch& out) noexcept {
   if (axis_state_known_ && axis_state_ != kClosedLoopControl && !order_due_ && !estop_due_) {
-    may_run_ = false;
-    return Enter(Step::kRest, now);
+    return Rest(now);
   }
-  if (out.room() < 3 || !Retry(now)) return;
+  if (out.room() < 3 || !Retry(now, kRetry)) return;
   out.Push(Make(kSetInputTorqueShort, node_, {0}));
   out.Push(Make(kSetAxisState, node_, {kIdle}));
   if (disarms_ >= kDisarmsBeforeEstop) out.Push(Make(kEstop, node_));

@@ -19,7 +19,7 @@ FrameUse CanSimpleMotor::OnFrame(const Frame& frame, int64_t now) noexcept {
   if (command == kAddress.command && reports_.two_drives())
     Fail(now, "two drives have its node id");
   if (const auto restart = reports_.TakeRestart()) {
-    lost_place_ = true;
+    LosePlace();
     const int64_t silent = restart->silence / 1000;
     if (restart->jump)
       Fail(now,
@@ -37,19 +37,18 @@ FrameUse CanSimpleMotor::OnFrame(const Frame& frame, int64_t now) noexcept {
 FrameUse CanSimpleMotor::OnHeartbeat(const Frame& frame, int64_t now) noexcept {
   const auto values = DecodePayload(kHeartbeat, frame);
   if (!values) return FrameUse::kRejected;
-  heard_ = present_ = true;
-  heartbeat_ = now;
+  Hear(now);
   axis_error_ = static_cast<uint32_t>((*values)[0]);
   axis_state_ = static_cast<int>((*values)[1]);
   axis_state_known_ = true;
   reports_.OnHeartbeat(axis_state_, now);
-  may_run_ = may_run_ || axis_state_ == kClosedLoopControl;
+  if (axis_state_ == kClosedLoopControl) MayRun();
   procedure_result_ = static_cast<int>((*values)[2]);
   ++beats_;
   const bool running = axis_state_ == kClosedLoopControl && axis_error_ == 0;
-  if (step_ == Step::kAwait && running) Enter(Step::kArmed, now);
+  if (step() == Step::kAwait && running) Enter(Step::kArmed, now);
   // The state counts, not only the error: drives have been seen to fall to IDLE with error 0.
-  if (step_ == Step::kArmed && !running) {
+  if (step() == Step::kArmed && !running) {
     if (axis_state_ == kClosedLoopControl)
       Fail(now, "the drive reports: {}", Words(axis_error_));
     else
@@ -64,8 +63,8 @@ FrameUse CanSimpleMotor::OnError(const Frame& frame) noexcept {
   const auto values = DecodePayload(kGetError, frame);
   if (!values) return FrameUse::kRejected;
   const auto disarm_reason = static_cast<uint32_t>((*values)[1]);
-  if (fault_ && step_ != Step::kArmed && axis_error_ == 0 && disarm_reason != 0) {
-    reason_.Set("the drive disarmed itself: {}", Words(disarm_reason));
+  if (faulty() && step() != Step::kArmed && axis_error_ == 0 && disarm_reason != 0) {
+    Explain("the drive disarmed itself: {}", Words(disarm_reason));
   }
   return FrameUse::kConsumed;
 }

@@ -73,7 +73,7 @@ class MitMotor : public AnsweringMotor<Step> {
     const bool late = Late(now);
     switch (step()) {
       case Step::kRest:
-        if (present() || Retry(now)) out.Push(MakeCommand(command_, node_, {}));
+        if (present() || Retry(now, kRetry)) out.Push(MakeCommand(command_, node_, {}));
         break;
       case Step::kZeros:
         if (late && sent() >= kZeroFrames) {
@@ -98,7 +98,7 @@ class MitMotor : public AnsweringMotor<Step> {
       case Step::kDisarming:
         if (Stopped(replies_)) {
           Rest(now);
-        } else if (Retry(now)) {
+        } else if (Retry(now, kRetry)) {
           out.Push(MakeSpecial(node_, kExit));
         }
     }
@@ -120,6 +120,7 @@ class MitMotor : public AnsweringMotor<Step> {
   void BeginArming(int64_t now) noexcept override { Enter(Step::kZeros, now); }
   void ForgetAnswers() noexcept override { replies_ = 0; }
   void OnSent(int64_t now) noexcept override {
+    AnsweringMotor::OnSent(now);
     if (step() == Step::kEnter && sent() >= kEnters) Enter(Step::kAwait, now);
   }
 

@@ -77,7 +77,7 @@ class MoteusMotor : public AnsweringMotor<Step> {
     // Text and numbers take it no longer than a setpoint does.
     Watch(now, step() == Step::kArmed ? watchdog_ : heartbeat_timeout());
     if (Active() && step() != Step::kArmed && Late(now)) GiveUpArming(now);
-    const bool speak = !Active() && (present() || Retry(now));
+    const bool speak = !Active() && (present() || Retry(now, kRetry));
     Give(speak);
     if (!speak) return;
     out.Push(step() == Step::kRest ? MakeFrame(CommandId(node_), {kQuestion}) : MakeStop(node_));

@@ -120,7 +120,7 @@ class RmdMotor : public AnsweringMotor<Step> {
         out.Push(MakeCommand(kLockBrake, node_));
         return;
       case Step::kSettle:
-        if (!may_arm || !Retry(now)) return;
+        if (!may_arm || !Retry(now, kRetry)) return;
         if (!watchdog_set_) {
           const int64_t milliseconds = watchdog_ / 1000;  // whole ones
           out.Push(MakeCommand(kWatchdog, node_, static_cast<double>(milliseconds)));
@@ -128,7 +128,7 @@ class RmdMotor : public AnsweringMotor<Step> {
         out.Push(MakeCommand(kAskStatus, node_));
         return;
       case Step::kRelease:
-        if (may_arm && Retry(now)) out.Push(MakeCommand(kReleaseBrake, node_));
+        if (may_arm && Retry(now, kRetry)) out.Push(MakeCommand(kReleaseBrake, node_));
         return;
       case Step::kAwait:
       case Step::kArmed:

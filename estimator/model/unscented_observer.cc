@@ -6,13 +6,12 @@
 
 #include "common/time_units.h"
 #include "estimator/kinematic_filter.h"
+#include "estimator/moved_by_hand.h"
 #include "estimator/square.h"
 #include "robot/motion_noise.h"
 
 namespace plumb {
 namespace {
-
-constexpr double kSurely = 5;  // standard deviations
 
 // A JOINT_STATE has one number per joint. A semi-implicit step is of first order: with substeps as
 // long as gym's, its error would be greater than the noise.
@@ -117,8 +116,7 @@ bool UnscentedObserver::UseReading(const joint_state_t& measured, size_t i) {
   const double position_variance = Square(s.position_sd) + Square(filter_.mean()(v) * s.timing_sd) +
                                    density * span * span * span / 3;
   const auto [innovation, variance] = filter_.Expect(row_, position, position_variance);
-  if (!(std::abs(innovation) <= std::max(s.reset_after, kSurely * std::sqrt(variance))))
-    return false;
+  if (MovedByHand(innovation, s.reset_after, std::sqrt(variance))) return false;
   filter_.Correct(row_, position, position_variance);
   if (!std::isfinite(measured.velocity[i])) return true;
   row_.setZero();
