@@ -27,6 +27,10 @@ void WriteState(int8_t state, std::string_view reason) {
               reason.empty() ? "" : ": ", reason);
 }
 
+void WriteLostStates(int64_t changes) {
+  spdlog::warn("{} changes of state before these are missing here: nobody read them", changes);
+}
+
 void LogCommandPolicy(const std::string& lcm_url, bool commands_signed) {
   if (commands_signed) return spdlog::info("takes signed commands only");
   if (!StaysOnMachine(lcm_url))
@@ -55,7 +59,7 @@ DriverProcess::DriverProcess(Process& process, const RobotDescription& robot,
           [this](const driver_request_t& request, std::string_view why) {
             OnForgedRequest(request, why);
           }),
-      log_(STDERR_FILENO, WriteState),
+      log_(STDERR_FILENO, WriteState, WriteLostStates),
       disarm_patience_(Microseconds(DisarmPatience(robot.driver) * std::max(1.0, clock_.scale()))) {
   for (const RobotBus& bus : buses_) fds_.push_back(bus.transport->fd());
   accepted_.resize(buses_.size());

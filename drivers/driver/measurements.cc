@@ -14,12 +14,6 @@ void Measurements::Add(int joint, const JointMeasurement& measurement, int64_t a
   joints_[static_cast<size_t>(joint)].Add(measurement, arrival);
 }
 
-int64_t Measurements::dropped() const noexcept {
-  int64_t dropped = 0;
-  for (const auto& joint : joints_) dropped += joint.dropped();
-  return dropped;
-}
-
 int64_t Measurements::lost() const noexcept {
   int64_t lost = 0;
   for (const auto& joint : joints_) lost += joint.lost();

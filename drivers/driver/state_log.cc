@@ -2,9 +2,12 @@
 
 #include <poll.h>
 
+#include <utility>
+
 namespace plumb {
 
-StateLog::StateLog(int fd, Write write) : fd_(fd), write_(std::move(write)) {}
+StateLog::StateLog(int fd, Write write, WriteLost lost)
+    : fd_(fd), write_(std::move(write)), write_lost_(std::move(lost)) {}
 
 void StateLog::Note(int8_t state, std::string_view reason) noexcept {
   if (state == newest_.state && reason == newest_.reason.text()) return;
@@ -13,13 +16,17 @@ void StateLog::Note(int8_t state, std::string_view reason) noexcept {
   if (count_ == kCapacity) {
     head_ = (head_ + 1) % kCapacity;
     --count_;
-    ++dropped_;
+    ++lost_;
   }
   ring_[(head_ + count_++) % kCapacity] = newest_;
 }
 
 void StateLog::Drain() {
   while (count_ > 0 && ready()) {
+    if (const int64_t lost = std::exchange(lost_, 0); lost > 0) {
+      write_lost_(lost);
+      continue;
+    }
     const Entry& entry = ring_[head_];
     write_(entry.state, entry.reason.text());
     head_ = (head_ + 1) % kCapacity;

@@ -17,9 +17,11 @@ namespace plumb {
 class StateLog {
  public:
   using Write = std::function<void(int8_t state, std::string_view reason)>;
+  using WriteLost = std::function<void(int64_t changes)>;
 
-  /// @param fd where `write` writes to, in the end.
-  StateLog(int fd, Write write);
+  /// @param fd where both write to, in the end. @param lost how many changes are missing before
+  /// the next that is written.
+  StateLog(int fd, Write write, WriteLost lost);
 
   /// A state (driver_status_t) and the reason for it; nothing if they are those of the last time.
   /// The oldest of those not written makes room.
@@ -30,8 +32,6 @@ class StateLog {
 
   /// True if a line can be written without waiting.
   bool ready() const noexcept;
-  /// Changes that were never written.
-  int64_t dropped() const noexcept { return dropped_; }
 
  private:
   static constexpr size_t kCapacity = 16;
@@ -43,10 +43,11 @@ class StateLog {
 
   int fd_;
   Write write_;
+  WriteLost write_lost_;
   std::array<Entry, kCapacity> ring_;
   Entry newest_;
   size_t head_ = 0, count_ = 0;
-  int64_t dropped_ = 0;
+  int64_t lost_ = 0;  // since the last that was written
 };
 
 }  // namespace plumb

@@ -55,7 +55,6 @@ class TimedSamples {
     ++dropped_;
   }
 
-  int64_t dropped() const noexcept { return dropped_; }
   /// Those dropped and those that never came; a gap or a step of the clock, after which it began
   /// anew, counts as one.
   int64_t lost() const noexcept { return dropped_ + sync_.lost() + sync_.resets(); }

@@ -106,7 +106,7 @@ TEST_CASE("a silent joint stops the measurements, not the others' time") {
   REQUIRE(measurements.Next(utime, set));
   CHECK(set[0].position == 999);
   CHECK(utime == Approx(kStart + kPeriod * 999 + 30).margin(600));
-  CHECK(measurements.dropped() == 999);
+  CHECK(measurements.lost() == 999);
 }
 
 }  // namespace
