@@ -8,6 +8,7 @@
 #include <span>
 
 #include "common/decoded.h"
+#include "common/driver_state_name.h"
 #include "common/seal.h"
 #include "plumb/calibration_status_t.hpp"
 #include "plumb/controller_status_t.hpp"
@@ -82,7 +83,6 @@ bool IsFinite(const controller_status_t& m) {
   return Finite(m.returns, m.late_rate) && std::isfinite(m.episode_return);
 }
 
-constexpr const char* kDriverStates[] = {"ABSENT", "IDLE", "ARMING", "ARMED", "FAULT"};
 constexpr const char* kPhases[] = {"WAITING", "PLACING", "RUNNING", "COMPLETE", "HALTED"};
 
 }  // namespace
@@ -163,9 +163,7 @@ void MessageWitness::OnSaid(int64_t time, const lockstep_post_t& post, const std
     RequireRising(time, channel, m->policy_iteration);
   } else if (channel == "DRIVER_STATUS") {
     if (const auto m = Decoded<driver_status_t>(post.data)) {
-      NoteChange(
-          time, "driver",
-          std::string(kDriverStates[static_cast<unsigned char>(m->state)]) + " " + m->reason);
+      NoteChange(time, "driver", std::string(DriverStateName(m->state)) + " " + m->reason);
     }
   }
 }

@@ -19,7 +19,7 @@ struct Hearing {
   const char* topic;
 };
 
-// Who listens to what.
+// Who listens to what, but for what only robots with an IMU have.
 constexpr std::array kHearings{
     Hearing{"plumb-driver", "JOINT_COMMAND"},
     Hearing{"plumb-driver", kBus},
@@ -35,6 +35,14 @@ constexpr std::array kHearings{
     Hearing{"plumb-trainer", "PARAMETER_DISTRIBUTION"},
     Hearing{"plumb-trainer", "CONTROLLER_STATUS"},
 };
+
+constexpr Hearing kImuHearing{"plumb-estimator", "IMU"};
+
+template <size_t count>
+const Hearing& Pick(const std::array<Hearing, count>& hearings, bool imu, Random& random) {
+  const size_t i = random.Below(count + (imu ? 1 : 0));
+  return i < count ? hearings[i] : kImuHearing;
+}
 
 struct Kind {
   Mischief what;
@@ -67,14 +75,14 @@ const Kind& PickKind(Random& random) {
   return *std::ranges::find_if(kKinds, [&](const Kind& kind) { return (left -= kind.weight) < 0; });
 }
 
-void PickVictim(Random& random, Prank& prank) {
+void PickVictim(Random& random, bool imu, Prank& prank) {
   const std::vector<std::string> names = ProcessNames();
   switch (prank.what) {
     case Mischief::kDrop:
     case Mischief::kDelay:
     case Mischief::kDouble:
     case Mischief::kCorrupt: {
-      const Hearing& hearing = kHearings[random.Below(kHearings.size())];
+      const Hearing& hearing = Pick(kHearings, imu, random);
       prank.whom = hearing.who;
       prank.topic = hearing.topic;
       return;
@@ -86,7 +94,7 @@ void PickVictim(Random& random, Prank& prank) {
                                                   {"plumb-controller", "ROBOT_STATE"},
                                                   {"plumb-controller", "POLICY"},
                                                   {"plumb-calibrator", "ROBOT_STATE_SMOOTHED"}}};
-      const Hearing& hearing = kTrusting[random.Below(kTrusting.size())];
+      const Hearing& hearing = Pick(kTrusting, imu, random);
       prank.whom = hearing.who;
       prank.topic = hearing.topic;
       return;
@@ -94,7 +102,7 @@ void PickVictim(Random& random, Prank& prank) {
     case Mischief::kReplay:
     case Mischief::kForge:
     case Mischief::kGarbage: {
-      const Hearing& hearing = kHearings[random.Below(kHearings.size())];
+      const Hearing& hearing = Pick(kHearings, imu, random);
       prank.topic = prank.what == Mischief::kGarbage || hearing.topic != std::string(kBus)
                         ? hearing.topic
                         : "DRIVER_REQUEST";
@@ -160,7 +168,7 @@ std::vector<std::string> ProcessNames() {
           "plumb-controller", "plumb-calibrator", "plumb-trainer"};
 }
 
-std::vector<Prank> MakeScript(uint64_t seed, int count, int64_t span) {
+std::vector<Prank> MakeScript(uint64_t seed, int count, int64_t span, bool imu) {
   Random random(seed, {kScriptStream});
   std::vector<Prank> script(static_cast<size_t>(count));
   for (Prank& prank : script) {
@@ -169,7 +177,7 @@ std::vector<Prank> MakeScript(uint64_t seed, int count, int64_t span) {
     prank.what = kind.what;
     if (kind.longest > 0)
       prank.duration = Microseconds(LogUniform(random, kind.shortest, kind.longest));
-    PickVictim(random, prank);
+    PickVictim(random, imu, prank);
     prank.amount = PickAmount(random, prank.what);
   }
   std::ranges::stable_sort(script, {}, &Prank::time);

@@ -44,8 +44,8 @@ inline constexpr char kBus[] = "CAN";
 std::vector<std::string> ProcessNames();
 
 /// What a monkey does with a seed: `count` pranks within `span` [us], in order of time. The same
-/// for the same arguments. Thread-safe, as Describe.
-std::vector<Prank> MakeScript(uint64_t seed, int count, int64_t span);
+/// for the same arguments. @param imu whether the robot has one. Thread-safe, as Describe.
+std::vector<Prank> MakeScript(uint64_t seed, int count, int64_t span, bool imu);
 
 /// "12.345678 s: drops 30 % of JOINT_COMMAND to plumb-driver for 0.12 s"
 std::string Describe(const Prank& prank);

@@ -40,6 +40,11 @@ constexpr uint32_t kDeedStream = 0x44656564;  // "Deed"
 constexpr char kBusUrl[] = "loop:chaos";
 constexpr auto kRealPatience = std::chrono::seconds(120);  // with one who computes
 
+bool HasImu(const RobotDescription& robot) {
+  return std::ranges::any_of(robot.sensors,
+                             [](const SensorDescription& sensor) { return sensor.link >= 0; });
+}
+
 class Trial {
  public:
   Trial(const TrialSetting& setting, std::function<void(const std::string&)> on_prank)
@@ -75,7 +80,7 @@ class Trial {
     try {
       for (const std::string& name : ProcessNames()) Start(name);
       for (const Prank& prank :
-           MakeScript(setting_.seed, setting_.pranks, Microseconds(setting_.span)))
+           MakeScript(setting_.seed, setting_.pranks, Microseconds(setting_.span), HasImu(robot_)))
         At(kBeginning + prank.time, [this, prank] { Do(prank); });
       while (!chronicle_.violated() &&
              !(plans_.empty() && operator_->Finished(setting_.iterations)))

@@ -1,4 +1,4 @@
-# The three kinds of target in this house. Dependencies point down only: a folder's library links the
+# The kinds of target in this house. Dependencies point down only: a folder's library links the
 # libraries below it and nothing else (tests/layering_test.py checks the includes).
 
 add_library(plumb_warnings INTERFACE)

@@ -16,7 +16,6 @@ for f in "$@"; do
     -e 's/^( *)if\((__[A-Za-z0-9_]+_len_?_?) > maxlen - pos\) return -1;$/\1if (\2 < 1 || \2 > maxlen - pos) return -1;/' \
     "$f"
   n=$(grep -cE '\.resize\(' "$f" || true); g=$(grep -cE '^ *if \((this->[A-Za-z0-9_]+|[0-9]+) < 0 \|\| .* > maxlen - pos\) return -1;$' "$f" || true)
-  s=$(grep -cE '_len_?_?( > maxlen|,)' "$f" || true)
   [ "$n" = "$g" ] || { echo "harden_lcm_gen: $f: $n resizes, $g guards" >&2; exit 1; }
   a=$(grep -cE '^ *if\(this->[A-Za-z0-9_]+\) \{$' "$f" || true); c=$(grep -cE '\.clear\(\);$' "$f" || true)
   [ "$a" = "$c" ] || { echo "harden_lcm_gen: $f: $a arrays, $c emptied" >&2; exit 1; }

@@ -27,7 +27,7 @@ bool Access::TokenGiven(std::string_view cookies) const {
     cookies.remove_prefix(std::min(end + 1, cookies.size()));
     while (cookie.starts_with(' ')) cookie.remove_prefix(1);
     const size_t equals = cookie.find('=');
-    if (equals != std::string_view::npos && cookie.substr(0, equals) == kTokenCookie &&
+    if (equals != std::string_view::npos && cookie.substr(0, equals).starts_with(kTokenCookie) &&
         IsToken(cookie.substr(equals + 1)))
       return true;
   }

@@ -24,6 +24,7 @@ struct Access {
   bool IsToken(std::string_view text) const;
 };
 
+/// What the name of the token's cookie begins with; the port follows.
 inline constexpr std::string_view kTokenCookie = "plumb_token";
 
 /// 128 random bits, as hexadecimal digits.

@@ -8,6 +8,7 @@
 
 #include "common/message_json.h"
 #include "common/time_units.h"
+#include "dashboard/channels.h"
 
 namespace plumb {
 
@@ -15,7 +16,7 @@ void ChannelStatistics::Add(std::string_view name, std::string_view type, size_t
                             int64_t arrival, Verdict verdict) {
   auto found = channels_.find(name);
   if (found == channels_.end()) {
-    if (channels_.size() >= kMaxChannels) return;
+    if (channels_.size() >= kMaxChannels && !IsChannelOfPage(name)) return;
     found = channels_.emplace(name, Channel{}).first;
   }
   Channel& channel = found->second;

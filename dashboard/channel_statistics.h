@@ -9,7 +9,8 @@
 namespace plumb {
 
 /// How much is said on each channel of LCM, how evenly, and how much of it does not decode.
-/// Channels come from outside: beyond kMaxChannels no more are listed. Not thread-safe.
+/// Channels come from outside: beyond kMaxChannels none but ChannelsOfPage are listed. Not
+/// thread-safe.
 class ChannelStatistics {
  public:
   static constexpr size_t kMaxChannels = 200;

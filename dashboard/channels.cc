@@ -1,5 +1,7 @@
 #include "dashboard/channels.h"
 
+#include <algorithm>
+
 namespace plumb {
 
 std::span<const ChannelOfPage> ChannelsOfPage() {
@@ -20,6 +22,10 @@ std::span<const ChannelOfPage> ChannelsOfPage() {
       {"TRAINING_STATUS", "training_status_t", false, true},
   };
   return kChannels;
+}
+
+bool IsChannelOfPage(std::string_view name) {
+  return std::ranges::find(ChannelsOfPage(), name, &ChannelOfPage::name) != ChannelsOfPage().end();
 }
 
 }  // namespace plumb

@@ -14,5 +14,7 @@ struct ChannelOfPage {
 
 /// All there are, but for the lockstep's, which are no channels. Thread-safe.
 std::span<const ChannelOfPage> ChannelsOfPage();
+/// Whether it is one of these. Thread-safe.
+bool IsChannelOfPage(std::string_view name);
 
 }  // namespace plumb

@@ -31,7 +31,7 @@ struct Server::Parts {
   /// Whoever opens any number of WebSockets keeps nobody else from the emergency stop: of the
   /// address that has most of them the oldest goes.
   void MakeRoomForViewer();
-  /// Why whoever asks like this may not arm; empty = he may.
+  /// Why whoever asks like this may not arm, whatever the run is; empty = he may.
   std::string WhyNotArm(const Request& request) const;
 
   asio::io_context& context;

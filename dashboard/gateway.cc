@@ -37,7 +37,8 @@ constexpr char kChannelsSchema[] =
     R"("channel":{"type":"string"},"type":{"type":"string"},"count":{"type":"integer"},)"
     R"("rate":{"type":"number"},"jitter_ms":{"type":"number"},)"
     R"("bytes_per_second":{"type":"number"},"undecodable":{"type":"integer"},)"
-    R"("refused":{"type":"integer"},"age_ms":{"type":"number"}}}}}})";
+    R"("refused":{"type":"integer"},"intervals":{"type":"array","items":{"type":"integer"}},)"
+    R"("age_ms":{"type":"number"}}}}}})";
 
 }  // namespace
 

@@ -55,7 +55,7 @@ class Gateway {
   void OnText(Viewer& viewer, std::string_view text);
   void OnBinary(Viewer& viewer, std::span<const uint8_t> frame, const Moment& moment);
 
-  /// Why nobody may arm here, whoever it is; empty: one may.
+  /// Why nobody may arm now, whoever it is; empty: one may.
   std::string WhyNotArm() const;
   size_t viewers() const { return topics_.viewers(); }
 

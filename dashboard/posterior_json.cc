@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 namespace plumb {
 namespace {
@@ -10,7 +11,8 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr std::array kProbabilities{.025, .25, .5, .75, .975};
-constexpr double kDetermined = 0.7;
+// Where the data tell as much as the prior: Identifiability calls less of a parameter weak.
+constexpr double kDetermined = std::numbers::sqrt2 / 2;
 
 /// Of a mixture's coordinate.
 double Probability(const GaussianMixture& mixture, Eigen::Index i, double below) {

@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "common/listen_address.h"
 #include "common/outside_text.h"
 #include "dashboard/foxglove.h"
 #include "dashboard/robot_json.h"
@@ -41,14 +42,19 @@ Response Guarded(Response response, const std::string& host) {
 }
 
 /// The token moves from the address, which stands in histories and pictures of screens, to a
-/// cookie.
-Response TakeToken(const Access& access, std::string_view token) {
+/// cookie. @param host the header "Host".
+Response TakeToken(const Access& access, std::string_view host, std::string_view token) {
   if (access.token.empty() || !access.IsToken(token))
     return Text(http::status::forbidden, "this token is not, or no longer, right");
+  // A cookie is its host's, whatever the port: each dashboard of a machine gets its own.
+  std::string name(kTokenCookie);
+  for (const char c : HostAndPort::Split(host).port) {
+    if ('0' <= c && c <= '9') name += c;
+  }
   Response response = Text(http::status::see_other, "");
   response.set(http::field::location, "/");
   response.set(http::field::set_cookie,
-               fmt::format("{}={}; HttpOnly; SameSite=Strict; Path=/", kTokenCookie, token));
+               fmt::format("{}={}; HttpOnly; SameSite=Strict; Path=/", name, token));
   return response;
 }
 
@@ -59,7 +65,8 @@ Response Find(const Parts& parts, const Request& request) {
                          query = target.substr(std::min(mark + 1, target.size()));
   constexpr std::string_view kToken = "token=";
   if (path == "/" && query.starts_with(kToken))
-    return TakeToken(parts.setting.access, query.substr(kToken.size()));
+    return TakeToken(parts.setting.access, View(request[http::field::host]),
+                     query.substr(kToken.size()));
   if (path == "/robot.json") {
     return MakeResponse(http::status::ok, "application/json",
                         RobotJson(parts.robot, parts.WhyNotArm(request)));

@@ -5,6 +5,7 @@
 
 #include "common/program_version.h"
 #include "dashboard/channels.h"
+#include "robot/coordinate_names.h"
 
 namespace plumb {
 namespace {
@@ -46,12 +47,11 @@ ordered_json Joint(const JointDescription& joint) {
           {"velocity", FiniteOrNull(joint.velocity_limit)}};
 }
 
-/// The entries of q or of v that belong to a joint.
-void AppendEntries(const JointDescription& joint, int count, const char* letters, const char* unit,
+/// The next so many entries of q or of v, which are a joint's.
+void AppendEntries(const std::vector<std::string>& names, int count, const char* unit,
                    ordered_json& entries) {
   for (int i = 0; i < count; ++i) {
-    const std::string part = count == 1 ? "" : std::string("/") + letters[i];
-    entries.push_back({{"name", joint.name + part}, {"unit", unit}});
+    entries.push_back({{"name", names[entries.size()]}, {"unit", unit}});
   }
 }
 
@@ -60,15 +60,16 @@ void AppendEntries(const JointDescription& joint, int count, const char* letters
 std::string RobotJson(const RobotDescription& robot, const std::string& why_not) {
   ordered_json joints = ordered_json::array(), coordinates = joints, velocities = joints,
                parameters = joints, channels = joints;
+  const CoordinateNames names(robot);
   for (const JointDescription& joint : robot.joints) {
     joints.push_back(Joint(joint));
     const bool slides = joint.type == Type::kPrismatic;
-    AppendEntries(joint, joint.num_positions(), "wxyz",
+    AppendEntries(names.q, joint.num_positions(),
                   slides                       ? "m"
                   : joint.num_positions() == 1 ? "rad"
                                                : "1",
                   coordinates);
-    AppendEntries(joint, joint.num_velocities(), "xyz", slides ? "m/s" : "rad/s", velocities);
+    AppendEntries(names.v, joint.num_velocities(), slides ? "m/s" : "rad/s", velocities);
   }
   for (const ParameterDescription& parameter : robot.parameters) {
     parameters.push_back({{"name", parameter.name},

@@ -31,6 +31,7 @@ void Wishes::Ask(int8_t request, Viewer& viewer, const ClientMessage::Call& call
 }
 
 void Wishes::OnStatus(const driver_status_t& status, int64_t now) {
+  unbelieved_ = false;
   for (Open& open : open_) {
     open.wish.OnStatus(status);
     if (open.wish.arms()) Say(open, now);

@@ -50,7 +50,7 @@ class Wishes {
   int64_t identity_;
   const bool has_key_;
   const std::string where_;
-  bool unbelieved_ = false;
+  bool unbelieved_ = false;  // the last status
   std::list<Open> open_;
 };
 

@@ -8,6 +8,7 @@
 #include <exception>
 #include <span>
 
+#include "common/driver_state_name.h"
 #include "common/lcm_url.h"
 #include "common/time_units.h"
 
@@ -21,10 +22,8 @@ constexpr int kBursts = 8;
 constexpr int64_t kFlight = int64_t{kFlightSeconds} * 1'000'000;  // [us]
 
 void WriteState(int8_t state, std::string_view reason) {
-  constexpr std::array kNames = {"ABSENT", "IDLE", "ARMING", "ARMED", "FAULT"};
   const auto level = state == driver_status_t::FAULT ? spdlog::level::warn : spdlog::level::info;
-  spdlog::log(level, "{}{}{}", kNames[static_cast<unsigned char>(state)],
-              reason.empty() ? "" : ": ", reason);
+  spdlog::log(level, "{}{}{}", DriverStateName(state), reason.empty() ? "" : ": ", reason);
 }
 
 void WriteLostStates(int64_t changes) {

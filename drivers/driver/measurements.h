@@ -34,8 +34,8 @@ class Measurements {
   /// @param measurements one for each joint.
   bool Next(int64_t& utime, std::span<JointMeasurement> measurements) noexcept;
 
-  /// Estimates that found no partners, or no room, and those that never came; a gap or a step of the clock, after which it began
-  /// anew, counts as one.
+  /// Estimates that found no partners, or no room, and those that never came; a gap or a step of
+  /// the clock, after which it began anew, counts as one.
   int64_t lost() const noexcept;
 
  private:

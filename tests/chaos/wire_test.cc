@@ -19,19 +19,23 @@ std::string Text(const std::vector<Prank>& script) {
 }
 
 TEST_CASE("a script follows from its seed, in order of time, and has all kinds of mischief") {
-  CHECK(Text(MakeScript(1, 50, kSpan)) == Text(MakeScript(1, 50, kSpan)));
-  CHECK(Text(MakeScript(1, 50, kSpan)) != Text(MakeScript(2, 50, kSpan)));
-  std::set<Mischief> kinds;
+  CHECK(Text(MakeScript(1, 50, kSpan, false)) == Text(MakeScript(1, 50, kSpan, false)));
+  CHECK(Text(MakeScript(1, 50, kSpan, false)) != Text(MakeScript(2, 50, kSpan, false)));
+  std::set<Mischief> kinds, of_imu, without_imu;
   for (uint64_t seed = 1; seed <= 20; ++seed) {
-    const std::vector<Prank> script = MakeScript(seed, 50, kSpan);
+    const std::vector<Prank> script = MakeScript(seed, 50, kSpan, seed % 2 == 0);
     REQUIRE(script.size() == 50);
     CHECK(std::ranges::is_sorted(script, {}, &Prank::time));
     for (const Prank& prank : script) {
       kinds.insert(prank.what);
+      if (prank.topic == "IMU") (seed % 2 == 0 ? of_imu : without_imu).insert(prank.what);
       CHECK((prank.time >= 0 && prank.time < kSpan));
     }
   }
   CHECK(kinds.size() == kMischiefs);
+  CHECK(without_imu.empty());
+  for (const Mischief what : {Mischief::kDrop, Mischief::kMadden, Mischief::kForge})
+    CHECK(of_imu.contains(what));
 }
 
 struct OnTheWay {

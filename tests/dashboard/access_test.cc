@@ -38,6 +38,7 @@ TEST_CASE("where a token is needed, it comes as a cookie") {
   CHECK(access.token != NewToken());
   CHECK_FALSE(access.TokenGiven(""));
   CHECK(access.TokenGiven("a=b; plumb_token=" + access.token + "; c=d"));
+  CHECK(access.TokenGiven("plumb_token8764=x; plumb_token8765=" + access.token));
   CHECK_FALSE(access.TokenGiven("plumb_token=" + access.token + "0"));
   CHECK_FALSE(access.TokenGiven("xplumb_token=" + access.token));
   CHECK_FALSE(access.TokenGiven("plumb_token=" + std::string(32, '0')));

@@ -56,6 +56,21 @@ TEST_CASE("whoever has asked for a channel hears each of its messages, and nobod
   CHECK(stand.looker.heard.size() == 500);
 }
 
+TEST_CASE("however many channels somebody invents, the robot's own are told of") {
+  Stand stand;
+  stand.Listen("PLUMB_CHANNELS");
+  for (int i = 0; i < 300; ++i)
+    stand.gateway.OnMessage("X" + std::to_string(i), std::vector<uint8_t>{1, 2, 3}, true, 0,
+                            stand.moment);
+  stand.Hear("ROBOT_STATE", State(0));
+  stand.Pass(500'000);
+  stand.looker.Take();
+  const json channels = stand.looker.heard.back().json["channels"];
+  CHECK(channels.size() == ChannelStatistics::kMaxChannels + 1);
+  CHECK(std::ranges::any_of(
+      channels, [](const json& channel) { return channel["channel"] == "ROBOT_STATE"; }));
+}
+
 TEST_CASE("the table of channels counts every message, and what does not decode") {
   Stand stand;
   stand.Pass(500'000);

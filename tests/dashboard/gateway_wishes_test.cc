@@ -50,6 +50,18 @@ TEST_CASE("arming is asked for once, by one who may") {
   stand.Hear("DRIVER_STATUS", Driver(driver_status_t::IDLE, stand.requests.back().identity));
 }
 
+TEST_CASE("a driver that was once not believed, and then was, is not said to lack the key") {
+  for (const bool believed_since : {false, true}) {
+    Stand stand({{}, true, 100, "udpm://x"});
+    stand.Hear("DRIVER_STATUS", Driver(driver_status_t::IDLE), false);
+    if (believed_since) stand.Hear("DRIVER_STATUS", Driver(driver_status_t::IDLE));
+    stand.Call(kEmergencyStop);
+    for (int i = 0; i < 40; ++i) stand.Pass(100'000);
+    INFO(stand.Answer());
+    CHECK((stand.Answer().find("not signed") == std::string::npos) == believed_since);
+  }
+}
+
 TEST_CASE("a person who places the robot is told what is missing") {
   Stand stand;
   stand.Call(kConfirmPlaced);

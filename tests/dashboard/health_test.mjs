@@ -58,7 +58,7 @@ test("of every process is shown what it says, how regularly it works and what it
   const said = mock.saidOfChannels.find((all) => of(all, "ROBOT_STATE")[9] === shown[9][2] && of(all, "JOINT_STATE")[12] === shown[12][1]);
   assert.deepEqual(shown, said[0].intervals.map((_, bin) => [2 ** bin, ...columns(said).map((counts) => counts[bin])]));
   // Of a hundred of the estimator's results one takes 2048 us or more.
-  assert.match(await page.locator("[data-process=estimator] td").last().innerText(), /99 % below 2\.0 ms/);
+  assert.match(await page.locator("[data-process=estimator] td").last().innerText(), /99 % < 2\.0 ms/);
   assert.equal(await page.locator("[data-process=calibrator] td").last().innerText(), "–");
   for (const [channel, message] of Object.entries(mock.counting)) {
     const all = await page.locator(`[data-of=${channel}] [data-counter]`).all();

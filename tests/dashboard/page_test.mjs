@@ -104,7 +104,7 @@ test("arming asks twice, and not at all who may not", visit({ robot: { may_contr
   assert.deepEqual(mock.asked, ["arm", "disarm"]);
 }));
 
-test("a run that may only be looked at says why", visit({ robot: { may_control: false, why_not: "a run in virtual time hears nobody" } }, {}, async ({ page, mock }) => {
+test("a run that may only be looked at says why", visit({ clock: "virtual" }, {}, async ({ page, mock }) => {
   await page.getByText("a run in virtual time hears nobody").waitFor();
   assert.ok(await page.getByRole("button", { name: "Arm…" }).isDisabled());
   await page.getByRole("button", { name: /Emergency stop/ }).click();

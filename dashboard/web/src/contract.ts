@@ -42,7 +42,7 @@ export interface ChannelCount {
   bytes_per_second: Value;
   undecodable: number;
   refused: number;
-  intervals: number[]; // between two arrivals, counted in the bins of DRIVER_STATUS
+  intervals: number[]; // between two arrivals, counted in bins as DRIVER_STATUS has them
   age_ms: Value;
 }
 

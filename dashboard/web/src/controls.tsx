@@ -4,7 +4,7 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { ask, state } from "./connection";
 import type { Service } from "./contract";
 import { number, withUnit } from "./format";
-import { driver_status_t } from "./messages";
+import { controller_status_t, driver_status_t } from "./messages";
 import { controller, driver, gateway, note, placing, robot } from "./run";
 
 const NAMES: Record<Service, string> = { emergency_stop: "Emergency stop", arm: "Arm", disarm: "Disarm", confirm_placed: "Robot placed" };
@@ -19,6 +19,11 @@ export const outcome = signal<Outcome | null>(null);
 /** Which confirmation is open. */
 export const confirming = signal<"arm" | null>(null);
 
+const virtual = () => gateway.value?.clock === "virtual";
+/** Disarming is everybody's, as stopping is, but that a run in virtual time hears nobody. */
+const mayDisarm = () => state.value === "open" && !virtual();
+const mayArm = () => mayDisarm() && !!robot.value?.may_control;
+
 let asked = 0;
 
 export async function request(service: Service) {
@@ -28,7 +33,9 @@ export async function request(service: Service) {
   const text = said || (ok ? "done" : "refused");
   // A late answer to an earlier wish does not hide that to a stop; it is among the events.
   if (mine === asked) outcome.value = { what, text, state: ok ? "done" : "failed" };
-  note(Date.now() * 1000, "this page", `${what}: ${text}`, ok ? "note" : "bad");
+  // In the run's own time, as all other events.
+  const now = gateway.value && gateway.value.clock !== "real" ? gateway.value.utime : Date.now() * 1000;
+  note(now, "this page", `${what}: ${text}`, ok ? "note" : "bad");
 }
 
 export function stop() {
@@ -83,30 +90,26 @@ function ArmDialog() {
 /** The controller waits for a person to put the robot where an episode begins. */
 function Placing() {
   const wish = placing.value;
-  if (controller.value?.phase !== 1 || !wish) return null;
+  if (controller.value?.phase !== controller_status_t.PLACING || !wish) return null;
   const { coordinates = [], velocities = [] } = robot.value ?? {};
   const at = wish.q.map((q, i) => `${withUnit(coordinates[i]?.name ?? `q[${i}]`, coordinates[i]?.unit)} ${number(q, 3)}`);
   const moving = wish.v.flatMap((v, i) => (v ? [`${withUnit(velocities[i]?.name ?? `v[${i}]`, velocities[i]?.unit)} ${number(v, 3)}`] : []));
   return (
     <div class="placing">
       <p><b>Place the robot</b> at {at.join(", ")}{moving.length ? `, moving with ${moving.join(", ")}` : ""}.</p>
-      <button disabled={!robot.value?.may_control || state.value !== "open"} onClick={() => void request("confirm_placed")}>It is placed</button>
+      <button disabled={!mayArm()} onClick={() => void request("confirm_placed")}>It is placed</button>
     </div>
   );
 }
 
 export function Controls() {
-  const open = state.value === "open";
-  const mayArm = open && !!robot.value?.may_control;
-  // Disarming is everybody's, as stopping is, but that a run in virtual time hears nobody.
-  const mayDisarm = open && gateway.value?.clock !== "virtual";
   const armed = driver.value?.state === driver_status_t.ARMED || driver.value?.state === driver_status_t.ARMING;
-  const why = robot.value && !robot.value.may_control ? robot.value.why_not : "";
+  const why = virtual() ? "a run in virtual time hears nobody from outside" : robot.value && !robot.value.may_control ? robot.value.why_not : "";
   return (
     <>
       <div class="controls" role="group" aria-label="Motors">
-        <button disabled={!mayArm || armed} onClick={() => (confirming.value = "arm")}>Arm…</button>
-        <button disabled={!mayDisarm || !armed} onClick={() => void request("disarm")}>Disarm</button>
+        <button disabled={!mayArm() || armed} onClick={() => (confirming.value = "arm")}>Arm…</button>
+        <button disabled={!mayDisarm() || !armed} onClick={() => void request("disarm")}>Disarm</button>
         {why && <p class="aside">{why}</p>}
       </div>
       <Placing />

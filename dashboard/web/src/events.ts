@@ -1,5 +1,5 @@
 // What has happened, told from how one message differs from the one before it.
-import { calibration_status_t, controller_status_t, driver_status_t, estimator_status_t, training_status_t } from "./messages";
+import { calibration_status_t, controller_status_t, driver_status_t, estimator_status_t, policy_t, training_status_t } from "./messages";
 
 export type Weight = "note" | "good" | "bad";
 
@@ -12,8 +12,14 @@ export interface Event {
 
 type Said = [text: string, weight?: Weight];
 
-export const DRIVER_STATES = ["absent", "idle", "arming", "armed", "fault"];
-export const PHASES = ["waiting", "placing", "running", "complete", "halted"];
+/** What a message's constants are called, by their values. @param prefix of those that are meant; it is left out. */
+function namesOf(constants: Record<string, number>, prefix = ""): string[] {
+  const names: string[] = [];
+  for (const [name, value] of Object.entries(constants)) if (name.startsWith(prefix)) names[value] ??= name.slice(prefix.length).toLowerCase();
+  return names;
+}
+export const DRIVER_STATES = namesOf(driver_status_t), SENSOR_STATES = namesOf(driver_status_t, "SENSOR_");
+export const PHASES = namesOf(controller_status_t);
 
 const because = (reason: string) => (reason ? `: ${reason}` : "");
 
@@ -49,7 +55,7 @@ function estimator(now: estimator_status_t, before: estimator_status_t | null): 
 function controller(now: controller_status_t, before: controller_status_t | null): Said[] {
   const said: Said[] = [];
   if (!before || now.policy_iteration !== before.policy_iteration || now.purpose !== before.purpose) {
-    if (now.policy_iteration >= 0) said.push([`policy ${now.policy_iteration}, ${now.purpose === 1 ? "to be judged" : "to learn from"}`]);
+    if (now.policy_iteration >= 0) said.push([`policy ${now.policy_iteration}, ${now.purpose === policy_t.EVALUATE ? "to be judged" : "to learn from"}`]);
   }
   const settled = now.phase === controller_status_t.HALTED || now.phase === controller_status_t.WAITING;
   if (settled && (now.phase !== before?.phase || now.reason !== before.reason) && now.reason) {

@@ -107,10 +107,15 @@ function telling<T>(channel: string, target: Signal<T | null> | null, keep?: (no
 }
 const before = new Map<string, unknown>();
 
+// Not asked of what is shown, which may be late, or forgotten.
+let rewinds: number | null = null;
+
 /** Where the run has been set back, as a log that is played from an earlier place on, the gateway knows what it was then. */
 function keepGateway(json: DataView) {
   const now = decode<Gateway>(json);
-  if (gateway.value && now.rewinds !== gateway.value.rewinds) renew();
+  const before = rewinds;
+  rewinds = now.rewinds;
+  if (before !== null && rewinds !== before) renew();
   publish(gateway, () => (gateway.value = now));
 }
 

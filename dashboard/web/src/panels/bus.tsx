@@ -1,4 +1,4 @@
-import { DRIVER_STATES } from "../events";
+import { DRIVER_STATES, SENSOR_STATES } from "../events";
 import type { bus_status_t, driver_status_t } from "../messages";
 import { Counters, type Names } from "../parts/counters";
 import { type Cell, Panel, Table } from "../parts/panel";
@@ -33,7 +33,7 @@ export function BusPanel() {
           <Table shown caption="Drives" columns={["joint", "drive", "motor [°C]", "power stage [°C]", "supply [V]", "supply [A]", "calls itself", "says"]}
             rows={d.joint_name.map((name, i) => [name, DRIVER_STATES[d.joint_state[i] ?? 0] ?? "", d.motor_temperature[i], d.drive_temperature[i], d.bus_voltage[i], d.bus_current[i], d.drive_identity[i], d.joint_reason[i]])} />
           {d.num_sensors > 0 && (
-            <Table shown caption="Sensors" columns={["sensor", "state", "says"]} rows={d.sensor_name.map((name, i) => [name, ["absent", "starting", "running", "fault"][d.sensor_state[i] ?? 0] ?? "", d.sensor_reason[i]])} />
+            <Table shown caption="Sensors" columns={["sensor", "state", "says"]} rows={d.sensor_name.map((name, i) => [name, SENSOR_STATES[d.sensor_state[i] ?? 0] ?? "", d.sensor_reason[i]])} />
           )}
           {e && (
             <Table shown caption="What the observer makes of its readings" columns={["joint", "age [s]", "position", "velocity", "acceleration", "bias", "says"]}

@@ -1,6 +1,6 @@
 import { DRIVER_STATES, PHASES } from "../events";
-import { grouped, number, seconds } from "../format";
-import { driver_status_t } from "../messages";
+import { grouped, number } from "../format";
+import { controller_status_t, driver_status_t } from "../messages";
 import { Age } from "../parts/age";
 import { Histogram, quantile } from "../parts/histogram";
 import { type Cell, Panel } from "../parts/panel";
@@ -22,7 +22,7 @@ function lives(): Life[] {
   return [
     { name: "driver", channel: "DRIVER_STATUS", result: "JOINT_STATE", old: 0.5, says: d ? `${DRIVER_STATES[d.state] ?? d.state}${d.reason ? `: ${d.reason}` : ""}` : "", well: d && d.state !== driver_status_t.FAULT },
     { name: "estimator", channel: "ESTIMATOR_STATUS", result: "ROBOT_STATE", old: 0.5, says: e ? (e.valid ? "the state is valid" : e.reason || "the state is not valid") : "", well: e && e.valid },
-    { name: "controller", channel: "CONTROLLER_STATUS", result: "JOINT_COMMAND", old: 0.5, says: c ? `${PHASES[c.phase] ?? c.phase}${c.reason ? `: ${c.reason}` : ""}` : "", well: c && c.phase !== 4 },
+    { name: "controller", channel: "CONTROLLER_STATUS", result: "JOINT_COMMAND", old: 0.5, says: c ? `${PHASES[c.phase] ?? c.phase}${c.reason ? `: ${c.reason}` : ""}` : "", well: c && c.phase !== controller_status_t.HALTED },
     { name: "calibrator", channel: "CALIBRATION_STATUS", result: null, old: 5, says: calibration ? `iteration ${calibration.iteration}${calibration.alarm ? ", the model does not explain the robot" : ""}${calibration.streamed_transitions ? `, ${calibration.streamed_transitions} transitions heard of the next` : ""}` : "", well: calibration ? !calibration.alarm : null },
     // While it computes it says nothing between updates.
     { name: "trainer", channel: "TRAINING_STATUS", result: null, old: Infinity, says: training ? `policy ${training.iteration}, ${training.complete ? "complete" : `update ${training.update} of ${training.updates}`}` : "", well: training ? true : null },
@@ -36,7 +36,7 @@ function Cycle({ name, result }: { name: string; result: string | null }) {
   const intervals = counted(result)?.intervals;
   const most = intervals && quantile(intervals, 0.99);
   if (!intervals || most == null) return <>–</>;
-  return <><Histogram small counts={intervals} label={`Time between two results of the ${name}`} />99 % below {seconds(most)}</>;
+  return <><Histogram small counts={intervals} label={`Time between two results of the ${name}`} />99 % {most}</>;
 }
 
 export function ProcessesPanel() {
@@ -46,7 +46,7 @@ export function ProcessesPanel() {
     <Panel id="processes" title="Processes" what="Of each process how old its last word is, what it says of itself, how many of its messages come in a second, and how long it takes from one result to the next (counted in bins that double)."
       numbers={() => [{
         caption: "Results by the time since the one before: the bin's lower end", columns: ["from [µs]", ...cyclic.map(({ name }) => name)],
-        rows: Array.from({ length: 24 }, (_, i): Cell[] => [2 ** i, ...cyclic.map(({ result }) => counted(result)?.intervals[i])]),
+        rows: Array.from({ length: Math.max(0, ...cyclic.map(({ result }) => counted(result)?.intervals.length ?? 0)) }, (_, i): Cell[] => [2 ** i, ...cyclic.map(({ result }) => counted(result)?.intervals[i])]),
       }]}>
       <div class="scroll" tabIndex={0} role="region" aria-label="Processes">
         <table>
@@ -81,7 +81,7 @@ const phases = ({ phase_name, phase_duration, num_bins }: driver_status_t) =>
 
 export function CyclePanel() {
   const d = driver.value;
-  const share = (counts: number[], of: number) => seconds(quantile(counts, of));
+  const share = (counts: number[], of: number) => quantile(counts, of) ?? "–";
   return (
     <Panel id="cycle" title="The driver's cycle" empty={!d && "The driver has said nothing yet."}
       what="How late the driver's cycles began, and how long each phase of a cycle took, since its start: counted in bins that double, drawn on a logarithmic scale."
@@ -92,13 +92,13 @@ export function CyclePanel() {
       {d && (
         <>
           <p class="line">
-            <b data-value={d.overruns}>{grouped(d.overruns)}</b> missed deadlines in <b data-value={d.cycles}>{grouped(d.cycles)}</b> cycles; half of them less than {share(d.lateness, 0.5)} late,
-            all but one in a hundred less than {share(d.lateness, 0.99)}, all less than {share(d.lateness, 1)}.
+            <b data-value={d.overruns}>{grouped(d.overruns)}</b> missed deadlines in <b data-value={d.cycles}>{grouped(d.cycles)}</b> cycles. How late they began: half of them
+            {share(d.lateness, 0.5)}, 99 % {share(d.lateness, 0.99)}, the latest {share(d.lateness, 1)}.
           </p>
-          <Histogram counts={d.lateness} label={`Lateness of ${d.cycles} cycles: median below ${share(d.lateness, 0.5)}, longest below ${share(d.lateness, 1)}`} />
+          <Histogram counts={d.lateness} label={`Lateness of ${d.cycles} cycles: median ${share(d.lateness, 0.5)}, longest ${share(d.lateness, 1)}`} />
           <div class="scroll" tabIndex={0} role="region" aria-label="Phases of a cycle">
           <table class="phases">
-            <thead><tr><th scope="col">phase</th><th scope="col">how long</th><th scope="col">half below</th><th scope="col">99 %</th><th scope="col">all</th></tr></thead>
+            <thead><tr><th scope="col">phase</th><th scope="col">how long</th><th scope="col">half</th><th scope="col">99 %</th><th scope="col">longest</th></tr></thead>
             <tbody>
               {phases(d).map(([name, counts]) => (
                 <tr key={name}>

@@ -1,6 +1,7 @@
 import { effect, signal } from "@preact/signals";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { DASH, number, plusMinus, withUnit } from "../format";
+import { controller_status_t } from "../messages";
 import { Choice, Key, Panel } from "../parts/panel";
 import { sideView } from "../robot/side";
 import type { OpenView, View } from "../robot/view";
@@ -96,10 +97,10 @@ function Episode() {
   const now = controller.value;
   if (!now) return <p class="line">No controller has been heard.</p>;
   const policy = now.policy_iteration < 0 ? "no policy yet" : `policy ${now.policy_iteration}`;
-  const wish = now.phase === 1 && placing.value ? `, to be placed at ${placing.value.q.map((q) => number(q, 3)).join(", ")}` : "";
+  const wish = now.phase === controller_status_t.PLACING && placing.value ? `, to be placed at ${placing.value.q.map((q) => number(q, 3)).join(", ")}` : "";
   return (
     <p class="line" data-episode>
-      <b>{PHASES[now.phase] ?? now.phase}</b>{now.reason ? `: ${now.reason}` : ""}, {policy}{wish}; episode {now.num_episodes + (now.phase === 2 ? 1 : 0)} of {now.episodes_wanted},
+      <b>{PHASES[now.phase] ?? now.phase}</b>{now.reason ? `: ${now.reason}` : ""}, {policy}{wish}; episode {now.num_episodes + (now.phase === controller_status_t.RUNNING ? 1 : 0)} of {now.episodes_wanted},
       step <span data-value={now.step}>{now.step}</span>, return so far <span data-value={now.episode_return ?? "null"}>{number(now.episode_return)}</span>
     </p>
   );

@@ -4,13 +4,14 @@ import { grouped, number, seconds } from "../format";
 export const lower = (bin: number) => (bin === 0 ? 0 : 2 ** bin * 1e-6);
 export const upper = (bin: number) => 2 ** (bin + 1) * 1e-6;
 
-/** The duration [s] that a share of all stays below: its bin's upper end. Null without any. */
-export function quantile(counts: number[], share: number): number | null {
+/** What a share of all does not exceed: its bin's upper end, "< 2.0 ms"; of the last bin, which has all that are longer, its
+ * lower one, "> 0.5 s". Null without any. */
+export function quantile(counts: number[], share: number): string | null {
   const total = counts.reduce((sum, count) => sum + count, 0);
   let below = 0;
   for (let bin = 0; total > 0 && bin < counts.length; bin++) {
     below += counts[bin]!;
-    if (below >= share * total) return upper(bin);
+    if (below >= share * total) return bin + 1 < counts.length ? `< ${seconds(upper(bin))}` : `> ${seconds(lower(bin))}`;
   }
   return null;
 }
@@ -24,7 +25,7 @@ export function Histogram({ counts, label, small = false }: { counts: number[]; 
     const tall = count > 0 ? Math.max(2, (Math.log10(count + 1) / most) * height) : 0;
     return (
       <rect key={bin} x={bin * 10 + 1} y={height - tall} width={8} height={tall} rx={1}>
-        <title>{`${number(lower(bin) * 1e6)} to ${seconds(upper(bin))}: ${grouped(count)}`}</title>
+        <title>{`${number(lower(bin) * 1e6)} to ${bin + 1 < counts.length ? seconds(upper(bin)) : "∞"}: ${grouped(count)}`}</title>
       </rect>
     );
   });
