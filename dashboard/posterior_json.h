@@ -11,7 +11,7 @@ inline constexpr int kPosteriorDraws = 200;
 
 /// A distribution of parameters beside its prior, for people to look at: moments, quantiles, and
 /// kPosteriorDraws draws of each, in physical units; the same distribution, the same draws. A
-/// parameter is "determined" if its standard deviation, in coordinates, is below 0.7 of the
+/// parameter is "determined" if its standard deviation, in coordinates, is below 0.71 of the
 /// prior's, as Identifiability has it. Thread-safe.
 /// @return {"utime":..,"iteration":..,"parameters":[..],...}
 std::string PosteriorJson(const ParameterDistribution& distribution,

@@ -8,11 +8,8 @@
 namespace plumb {
 
 /// The host's side of a drive that speaks only when spoken to: its answers show that it is there,
-/// and that it has stopped.
-///
-/// It begins by disarming: whoever was here before us may have left the drive running. Disarming
-/// ends when an answer to the second order to stop has come, for the first one may be the answer to
-/// an earlier command.
+/// and that it has stopped. It begins by disarming: whoever was here before us may have left the
+/// drive running.
 /// @tparam Step as SteppedMotor's. Not thread-safe.
 template <class Step>
 class AnsweringMotor : public SteppedMotor<Step> {
@@ -33,17 +30,10 @@ class AnsweringMotor : public SteppedMotor<Step> {
   explicit AnsweringMotor(const MotorTiming& timing)
       : Base(Step::kDisarming, timing, {"no answer yet", "no answer any more"}) {}
 
-  /// Whether an order to stop that is not the first has been answered.
-  bool Stopped(int answers) const noexcept { return Base::sent() >= kStops && answers > 0; }
-
   /// Each Tick begins with it. @param silence [us] that an active drive may not reach.
   void Watch(int64_t now, int64_t silence) noexcept {
     Base::NotePresence(now);
     if (Base::Active() && Base::heard() && now - Base::answered() >= silence) FailSilent(now);
-  }
-
-  void OnSent(int64_t) noexcept override {
-    if (Base::step() == Step::kDisarming && Base::sent() <= kStops) this->ForgetAnswers();
   }
 
   template <class... Args>
@@ -54,9 +44,6 @@ class AnsweringMotor : public SteppedMotor<Step> {
     if (Base::Active()) Disarm(now);
   }
   void FailSilent(int64_t now) noexcept { Fail(now, "no answer for {} ms", Base::SilentFor(now)); }
-
- private:
-  static constexpr int kStops = 2;
 };
 
 }  // namespace plumb

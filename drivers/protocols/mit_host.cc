@@ -120,7 +120,6 @@ class MitMotor : public AnsweringMotor<Step> {
   void BeginArming(int64_t now) noexcept override { Enter(Step::kZeros, now); }
   void ForgetAnswers() noexcept override { replies_ = 0; }
   void OnSent(int64_t now) noexcept override {
-    AnsweringMotor::OnSent(now);
     if (step() == Step::kEnter && sent() >= kEnters) Enter(Step::kAwait, now);
   }
 

@@ -32,6 +32,7 @@ class SteppedMotor : public Motor {
       return;
     }
     ++sent_;
+    if (step_ == Step::kDisarming && sent_ <= kStops) ForgetAnswers();
     OnSent(now);
   }
 
@@ -47,7 +48,7 @@ class SteppedMotor : public Motor {
     return Active() ? DriveState::kArming : DriveState::kIdle;
   }
   std::string_view reason() const noexcept final {
-    if (reason_.text().empty() && !present_) return heard_ ? silence_.again : silence_.ever;
+    if (reason_.text().empty() && !present_) return heard_ ? silence_.any_more : silence_.yet;
     return reason_.text();
   }
   bool confirmed_idle() const noexcept override {
@@ -55,9 +56,10 @@ class SteppedMotor : public Motor {
   }
 
  protected:
-  /// The reasons of an absent drive: one that has never spoken, and one that does not any more.
+  /// The reasons of an absent drive: of one that has not spoken yet, and of one that does not any
+  /// more.
   struct Silence {
-    std::string_view ever, again;
+    std::string_view yet, any_more;
   };
 
   /// @param first what it does until it is first armed, kRest or kDisarming.
@@ -81,6 +83,10 @@ class SteppedMotor : public Motor {
   int64_t heartbeat_timeout() const noexcept { return heartbeat_timeout_; }
   /// In this step: Ticks with orders that have been accepted.
   int sent() const noexcept { return sent_; }
+  /// Whether an order to stop that is not the first has been answered: an answer after the first
+  /// may be one to an earlier command. @param answers since the drive was told to stop, as
+  /// ForgetAnswers counts them.
+  bool Stopped(int answers) const noexcept { return sent_ >= kStops && answers > 0; }
 
   void Enter(Step step, int64_t now) noexcept {
     step_ = step;
@@ -132,6 +138,8 @@ class SteppedMotor : public Motor {
   void CountSaturation() noexcept { ++saturations_; }
 
  private:
+  static constexpr int kStops = 2;
+
   const int64_t heartbeat_timeout_;
   const Silence silence_;
   bool heard_ = false, present_ = false;

@@ -377,19 +377,25 @@ class Heard(unittest.TestCase):
         dashboard.works(self)
 
 
+def arm_and_stop(test, page):
+    """@param page that listens to DRIVER_STATUS."""
+    page.until(lambda one: one and one[0] == "DRIVER_STATUS" and one[2]["state"] == plumb.driver_status_t.IDLE)
+    end = time.monotonic() + PATIENCE
+    while not (answer := page.call("arm"))["ok"]:  # until the driver's start guard is over
+        test.assertLess(time.monotonic(), end, answer)
+    # armed until the silence of commands ends it: a stop is another reason
+    answer = page.call("emergency_stop")
+    test.assertEqual(answer["ok"], True, answer)
+    heard = page.until(lambda one: one and one[0] == "DRIVER_STATUS" and one[2]["state"] != plumb.driver_status_t.ARMED and
+                       one[2]["stopped_by_request"])
+    test.assertIn("emergency stop", heard[-1][2]["reason"])
+
+
 class Stopped(unittest.TestCase):
     def arm_and_stop(self, dashboard, more=""):
         page = client.Page(dashboard.address, more=more)
         page.subscribe("DRIVER_STATUS")
-        page.until(lambda one: one and one[2]["state"] == plumb.driver_status_t.IDLE)
-        end = time.monotonic() + PATIENCE
-        while not page.call("arm")["ok"]:  # until the driver's start guard is over
-            self.assertLess(time.monotonic(), end)
-        # armed until the silence of commands ends it: a stop is another reason
-        answer = page.call("emergency_stop")
-        self.assertEqual(answer["ok"], True, answer)
-        heard = page.until(lambda one: one and one[2]["state"] != plumb.driver_status_t.ARMED and one[2]["stopped_by_request"])
-        self.assertIn("emergency stop", heard[-1][2]["reason"])
+        arm_and_stop(self, page)
 
     def test_an_emergency_stop_disarms_the_driver(self):
         bus = f"udp:239.74.163.60:{LCM.port}"
@@ -439,6 +445,23 @@ class Launched(unittest.TestCase):
         self.addCleanup(stop)
         return run, [run.stdout.readline(), run.stdout.readline()][1]
 
+    def test_whoever_came_in_a_virtual_run_may_arm_in_the_real_one_that_follows(self):
+        dashboard = Dashboard(self)
+        run, _ = self.launch()
+        watching = client.Page(dashboard.address)
+        watching.subscribe("PLUMB_GATEWAY")
+        watching.until(lambda one: one and one[0] == "PLUMB_GATEWAY" and one[2]["clock"] == "virtual")
+        page = client.Page(dashboard.address)
+        page.subscribe("DRIVER_STATUS", "PLUMB_GATEWAY")
+        self.assertIn("virtual time", page.call("arm")["text"])
+        run.send_signal(signal.SIGINT)
+        run.wait(PATIENCE)
+        bus = f"udp:239.74.163.60:{LCM.port}"
+        Process(self, "plumb-robot", "--bus", bus)
+        Process(self, "plumb-driver", "--bus", bus, "--virtual")
+        page.until(lambda one: one and one[0] == "PLUMB_GATEWAY" and one[2]["clock"] == "real")
+        arm_and_stop(self, page)
+
     def test_a_run_in_virtual_time_is_shown_and_hears_nothing_but_a_stop(self):
         run, line = self.launch("--dashboard", "127.0.0.1:0")
         address = ("127.0.0.1", int(re.match(r"dashboard: http://127.0.0.1:(\d+)/$", line)[1]))
@@ -446,7 +469,8 @@ class Launched(unittest.TestCase):
         page.subscribe("DRIVER_STATUS", "PLUMB_GATEWAY")
         heard = page.until(lambda one: one and one[0] == "DRIVER_STATUS" and one[2]["state"] == plumb.driver_status_t.ARMED)
         gateway = page.until(lambda one: one and one[0] == "PLUMB_GATEWAY" and one[2]["utime"] >= heard[-1][2]["utime"])[-1][2]
-        self.assertEqual(gateway["clock"], "virtual")
+        self.assertEqual(gateway["clock"], "virtual")  # which keeps everybody from arming, for as long as it lasts
+        self.assertTrue(json.loads(client.body(client.get(address, "/robot.json")))["may_control"])
         for service in ("arm", "disarm", "confirm_placed"):
             self.assertEqual(page.call(service), {"ok": False, "text": "a run in virtual time hears nobody from outside"})
         answer = page.call("emergency_stop")
