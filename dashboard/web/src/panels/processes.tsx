@@ -92,8 +92,8 @@ export function CyclePanel() {
       {d && (
         <>
           <p class="line">
-            <b data-value={d.overruns}>{grouped(d.overruns)}</b> missed deadlines in <b data-value={d.cycles}>{grouped(d.cycles)}</b> cycles. How late they began: half of them
-            {share(d.lateness, 0.5)}, 99 % {share(d.lateness, 0.99)}, the latest {share(d.lateness, 1)}.
+            <b data-value={d.overruns}>{grouped(d.overruns)}</b> missed deadlines in <b data-value={d.cycles}>{grouped(d.cycles)}</b> cycles.{" "}
+            How late they began: half of them {share(d.lateness, 0.5)}, 99 % {share(d.lateness, 0.99)}, the latest {share(d.lateness, 1)}.
           </p>
           <Histogram counts={d.lateness} label={`Lateness of ${d.cycles} cycles: median ${share(d.lateness, 0.5)}, longest ${share(d.lateness, 1)}`} />
           <div class="scroll" tabIndex={0} role="region" aria-label="Phases of a cycle">
