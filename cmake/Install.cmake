@@ -31,8 +31,10 @@ foreach(name ${programs} plumb-dashboard)  # bash looks for a file of the comman
   install(FILES scripts/plumb-completion.bash DESTINATION share/bash-completion/completions RENAME ${name} COMPONENT ${component})
 endforeach()
 set(man ${PROJECT_BINARY_DIR}/man)
+get_property(experiments GLOBAL PROPERTY PLUMB_EXPERIMENTS)
+list(JOIN experiments "|" experiments)
 install(DIRECTORY ${man}/ DESTINATION share/man/man1 COMPONENT runtime OPTIONAL FILES_MATCHING PATTERN "*.1"
-  REGEX "/plumb-(dashboard|chaos|figure-.|learning-curves|reality-gap|sample-efficiency|step-vs-trajectory)\\.1$" EXCLUDE)
+  REGEX "/plumb-(dashboard|chaos|${experiments})\\.1$" EXCLUDE)
 install(FILES ${man}/plumb-dashboard.1 DESTINATION share/man/man1 COMPONENT dashboard OPTIONAL)
 install(FILES README.md CHANGELOG.md CITATION.cff DESTINATION share/doc/plumbline COMPONENT runtime)
 install(DIRECTORY docs DESTINATION share/doc/plumbline COMPONENT doc)
