@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <vector>
 
 #include "common/special_numbers.h"
 
@@ -18,7 +19,38 @@ double ExpectedSteps(int falls, double rate, double m) {
   return rate / falls * (1 - std::pow(rate / (rate + m), falls));
 }
 
+struct Normal {
+  double mean = 0, variance = 0;
+};
+
+// Two independent measurements of one thing, by inverse-variance weighting.
+Normal Fused(const Normal& a, const Normal& b) {
+  const double sum = a.variance + b.variance;
+  if (sum == 0) return {(a.mean + b.mean) / 2, 0};
+  return {(b.variance * a.mean + a.variance * b.mean) / sum, a.variance * b.variance / sum};
+}
+
+double ProbabilityPositive(const Normal& x) {
+  if (x.variance == 0) return x.mean > 0 ? 1 : x.mean < 0 ? 0 : 0.5;
+  return std::erfc(-x.mean / std::sqrt(x.variance) / std::sqrt(2.0)) / 2;
+}
+
 }  // namespace
+
+Acceptance::Simulated Acceptance::Simulated::Of(std::span<const double> challenger,
+                                                std::span<const double> incumbent) {
+  if (challenger.size() != incumbent.size())
+    throw std::invalid_argument(
+        fmt::format("{} simulated returns of the challenger, {} of the incumbent",
+                    challenger.size(), incumbent.size()));
+  std::vector<double> differences;
+  for (size_t i = 0; i < challenger.size(); ++i)
+    differences.push_back(challenger[i] - incumbent[i]);
+  const auto pairs = std::count_if(differences.begin(), differences.end(),
+                                   [](double x) { return std::isfinite(x); });
+  return {Evaluate(challenger).mean, Evaluate(incumbent).mean,
+          Scatter(differences) / std::sqrt(static_cast<double>(std::max<ptrdiff_t>(pairs, 1)))};
+}
 
 void Acceptance::Add(int iteration, const Trial& trial) {
   trials_[iteration].push_back(trial);
@@ -52,12 +84,18 @@ double Acceptance::Better(int challenger, double scatter, const Simulated& simul
     const double sd = std::max(scatter, kScatter * std::abs(MeanReturn(iteration)));
     return sd * sd / static_cast<double>(trials_.at(iteration).size());
   };
+  Normal difference{MeanReturn(challenger) - MeanReturn(incumbent_),
+                    variance(challenger) + variance(incumbent_)};
   const double in_simulation = simulated.challenger - simulated.incumbent;
-  const double difference = MeanReturn(challenger) - MeanReturn(incumbent_) +
-                            (std::isfinite(in_simulation) ? kSimulated * in_simulation : 0),
-               sd = std::sqrt(variance(challenger) + variance(incumbent_));
-  if (sd == 0) return difference > 0 ? 1 : difference < 0 ? 0 : 0.5;
-  return std::erfc(-difference / sd / std::sqrt(2.0)) / 2;
+  if (std::isfinite(in_simulation)) {
+    if (scatter > kBeginnings * std::abs(MeanReturn(challenger))) {
+      const double sd = std::hypot((1 - kSimulated) * in_simulation, simulated.difference_sd);
+      difference = Fused(difference, {in_simulation, sd * sd});
+    } else {
+      difference.mean += kSimulated * in_simulation;
+    }
+  }
+  return ProbabilityPositive(difference);
 }
 
 Acceptance::Decision Acceptance::Decide(int challenger, double scatter,
@@ -94,9 +132,10 @@ Acceptance::Decision Acceptance::Choose(Trainer& trainer, const GaussianPolicy& 
   if (learnt.explained) return Trust(challenger, scatter);
   const auto simulated = [&](const GaussianPolicy& policy) {
     const ParameterSampler sample = [&](Random& random) { return learnt.Draw(random); };
-    return trainer.EvaluateHeldOut(policy, sample, kSimulators).mean;
+    return trainer.HeldOutReturns(policy, sample, kSimulators);
   };
-  return Decide(challenger, scatter, {simulated(trainer.policy()), simulated(incumbent)});
+  return Decide(challenger, scatter,
+                Simulated::Of(simulated(trainer.policy()), simulated(incumbent)));
 }
 
 std::string Summary(const Acceptance::Decision& d) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -35,6 +36,12 @@ namespace plumb {
 /// since know of them: of too many, but of more where a policy does fall. Challenger and incumbent
 /// are therefore compared by the difference of their returns as trials have it, and kSimulated of
 /// the difference in simulation (docs/gap.md).
+///
+/// Where an episode may begin anywhere, as a pendulum's, a trial says more of where it began than
+/// of the policy, and simulators, where both begin alike, say more. If returns scatter by more than
+/// kBeginnings of themselves by where they begin, the two differences are weighted by how precise
+/// they are (inverse-variance weighting): that of trials by their scatter, that in simulation by
+/// the scatter of its mean, and by 1 - kSimulated of itself, as simulators may be wrong by that.
 /// Not thread-safe; the same bits for the same trials.
 class Acceptance {
  public:
@@ -51,6 +58,11 @@ class Acceptance {
   /// means; NaN = they cannot say.
   struct Simulated {
     double challenger = 0, incumbent = 0;
+    double difference_sd = 0;  ///< of the difference of the means, for the few simulators, >= 0
+    /// @param challenger,incumbent returns in the same simulators from the same states, NaN where
+    /// one failed
+    /// @throws std::invalid_argument if these are not as many.
+    static Simulated Of(std::span<const double> challenger, std::span<const double> incumbent);
   };
 
   /// How the latest challenger has done.
@@ -85,6 +97,7 @@ class Acceptance {
   static constexpr double kSure = 0.75;
   static constexpr double kScatter = 0.008;
   static constexpr double kSimulated = 0.5;
+  static constexpr double kBeginnings = 0.1;
   static constexpr int kSimulators = 60;  ///< that Simulated is to be of
 
  private:

@@ -144,6 +144,7 @@ void Transfer(Archive& archive, C& decision) {
   archive(decision.probability);
   archive(decision.challenger_return);
   archive(decision.incumbent_return);
+  // not simulated.difference_sd, which nobody is told
   archive(decision.simulated.challenger);
   archive(decision.simulated.incumbent);
 }

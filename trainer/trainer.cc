@@ -221,9 +221,9 @@ Evaluation Trainer::Evaluate(const ParameterSampler& sample, int episodes) {
                                           static_cast<uint32_t>(updates_)));
 }
 
-Evaluation Trainer::EvaluateHeldOut(const GaussianPolicy& policy, const ParameterSampler& sample,
-                                    int episodes) {
-  return plumb::Evaluate(rollout_.Returns(policy, sample, episodes, seed_, kHeldOutStream, 0));
+std::vector<double> Trainer::HeldOutReturns(const GaussianPolicy& policy,
+                                            const ParameterSampler& sample, int episodes) {
+  return rollout_.Returns(policy, sample, episodes, seed_, kHeldOutStream, 0);
 }
 
 double Trainer::ScatterOfStarts(const SimulatorDraw& simulator) {

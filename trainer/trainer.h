@@ -112,10 +112,11 @@ class Trainer {
   /// The same on simulators and initial states that are always the same for a seed, so that
   /// policies can be compared.
   Evaluation EvaluateHeldOut(const ParameterSampler& sample, int episodes) {
-    return EvaluateHeldOut(policy_, sample, episodes);
+    return plumb::Evaluate(HeldOutReturns(policy_, sample, episodes));
   }
-  Evaluation EvaluateHeldOut(const GaussianPolicy& policy, const ParameterSampler& sample,
-                             int episodes);
+  /// Of any policy: the returns themselves, NaN where an episode failed.
+  std::vector<double> HeldOutReturns(const GaussianPolicy& policy, const ParameterSampler& sample,
+                                     int episodes);
   /// By how much (sd) the policy's returns in one simulator differ for where the task lets an
   /// episode begin: Scatter of those of 40 episodes without exploration, always the same, that last
   /// until the time limit.

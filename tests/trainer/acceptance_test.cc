@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <vector>
 
 namespace plumb {
 namespace {
@@ -93,7 +94,7 @@ TEST_CASE("who begins better has not done better") {
   acceptance.Add(1, Hops(500, 3, false));
   acceptance.Add(2, Hops(500, 3.6, false));
   // 600 apart, each with 600 of scatter by where it begins: Phi(1 / sqrt 2) = 0.76
-  CHECK(acceptance.Decide(2, 600, {}).probability == Approx(0.76).margin(0.005));
+  CHECK(acceptance.Decide(2, 600, {NAN, NAN}).probability == Approx(0.76).margin(0.005));
   // less than trials scatter by that begin alike: as if there were none
   acceptance.Add(3, Hops(500, 3.6288, false));
   Acceptance alike = acceptance;
@@ -140,6 +141,46 @@ TEST_CASE("half of a difference in simulation counts") {
   CHECK(probability({2000, 2000}) == Approx(alike));
   CHECK(probability({NAN, 2000}) == Approx(alike));
   CHECK(probability({NAN, NAN}) == Approx(alike));
+}
+
+TEST_CASE("where beginnings decide, trials and simulators count by how precise they are") {
+  const auto probability = [](double scatter, const Acceptance::Simulated& simulated) {
+    Acceptance acceptance(1000);
+    acceptance.Add(1, Hops(500, 3, false));
+    acceptance.Add(2, Hops(500, 3.3, false));
+    return acceptance.Decide(2, scatter, simulated).probability;
+  };
+  const auto normal = [](double mean, double sd) {
+    return std::erfc(-mean / sd / std::sqrt(2.0)) / 2;
+  };
+  // 300 more in trials that scatter by 400 each, 100 less in simulators, half of which is doubt;
+  // precisions 1 / 320000 and 1 / (2500 + 900)
+  const double trials = 2 * 400. * 400, simulators = 50. * 50 + 30. * 30;
+  const double mean = (300 / trials - 100 / simulators) / (1 / trials + 1 / simulators);
+  const double sd = std::sqrt(1 / (1 / trials + 1 / simulators));
+  CHECK(probability(400, {2000, 2100, 30}) == Approx(normal(mean, sd)));
+  CHECK(probability(400, {2000, 2100, 30}) < 0.06);
+  // Simulators that have not told the policies apart leave it to the trials.
+  CHECK(probability(400, {2000, 1999.9, 1e5}) ==
+        Approx(normal(300, std::sqrt(trials))).margin(1e-4));
+  CHECK(probability(400, {2000, 2000, 0}) == 0.5);
+  CHECK(probability(400, {NAN, NAN, NAN}) == Approx(normal(300, std::sqrt(trials))));
+  // A tenth of 3300 is where beginnings begin to decide.
+  const double both =
+      (300 / 331. / 331 / 2 - 600 / 300. / 300) / (1 / 331. / 331 / 2 + 1 / 300. / 300);
+  CHECK(probability(331, {2000, 2600, 0}) ==
+        Approx(normal(both, 1 / std::sqrt(1 / 331. / 331 / 2 + 1 / 300. / 300))));
+  CHECK(probability(329, {2000, 2600, 0}) == Approx(0.5));
+}
+
+TEST_CASE("what policies return in the same simulators tells them apart by its difference") {
+  const std::vector<double> challenger{10, 22, 30, NAN, 50}, incumbent{9, 20, 27, 38, NAN};
+  const auto simulated = Acceptance::Simulated::Of(challenger, incumbent);
+  CHECK(simulated.challenger == 28);
+  CHECK(simulated.incumbent == 23.5);
+  CHECK(simulated.difference_sd == Approx(1 / std::sqrt(3.)));  // of 1, 2 and 3
+  CHECK_THROWS_AS(Acceptance::Simulated::Of(challenger, std::vector<double>{1}),
+                  std::invalid_argument);
 }
 
 TEST_CASE("a decision says who, why and how sure") {

@@ -73,7 +73,9 @@ TEST_CASE("A run that is interrupted and resumed ends in the same bits") {
 TEST_CASE("Trials, the incumbent and the reason survive an interruption") {
   const TemporaryFolder folder;
   TrainingSession straight = NewSession(4, 3);
-  const auto policies = RunAll(straight, {-2, -1, -1.02}, Lacking);
+  // So far apart that trials decide, wherever an episode begins.
+  const std::vector<double> rates{-2000, -1000, -1020};
+  const auto policies = RunAll(straight, rates, Lacking);
   // Interrupted after every roll-out and in the middle of every training.
   const auto anew = [] {
     return std::make_unique<TrainingSession>(PendulumRobot(), MakeGymPendulum, 3, 4, 1);
@@ -84,7 +86,6 @@ TEST_CASE("Trials, the incumbent and the reason survive an interruption") {
     session = anew();
     session->Restore(LoadCheckpoint(CheckpointIn(folder)).value());
   };
-  const std::vector<double> rates{-2, -1, -1.02};
   for (int iteration = 0; iteration <= 3; ++iteration) {
     REQUIRE(session->Begin(Lacking(iteration)));
     session->Advance();
