@@ -21,6 +21,8 @@ double LogDeterminant(const Eigen::LLT<Eigen::MatrixXd>& factor) {
 
 }  // namespace
 
+double NormalCdf(double u) { return 0.5 * std::erfc(-u * M_SQRT1_2); }
+
 double LogDensity(const Gaussian& p, const Eigen::VectorXd& x) {
   const auto factor = Factor(p);
   const double n = static_cast<double>(x.size());

@@ -23,6 +23,9 @@ struct GaussianMixture {
   bool operator==(const GaussianMixture&) const = default;
 };
 
+/// Probability that a standard normal deviate is less than u, accurate in both tails.
+double NormalCdf(double u);
+
 /// ln p(x). @throws std::invalid_argument if the covariance is not positive definite (also below).
 double LogDensity(const Gaussian& p, const Eigen::VectorXd& x);
 

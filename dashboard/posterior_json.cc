@@ -5,6 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "common/gaussian.h"
+
 namespace plumb {
 namespace {
 
@@ -21,7 +23,7 @@ double Probability(const GaussianMixture& mixture, Eigen::Index i, double below)
     const Gaussian& component = mixture.components[k];
     const double sd = std::sqrt(component.covariance(i, i));
     const double distance = below - component.mean(i);
-    const double part = sd > 0 ? std::erfc(-distance / sd / std::sqrt(2.)) / 2 : distance >= 0;
+    const double part = sd > 0 ? NormalCdf(distance / sd) : distance >= 0;
     probability += mixture.weights[k] * part;
   }
   return probability;

@@ -13,6 +13,7 @@
 #include "calibrator/inference/reps_search.h"
 #include "common/atomic_file.h"
 #include "common/examples.h"
+#include "common/gaussian.h"
 #include "experiments/jobs.h"
 #include "experiments/options.h"
 #include "experiments/population_weights.h"
@@ -190,7 +191,7 @@ Results::Rows Tabulate(const VectorXd& grid, const Gaussian& found) {
   const double mean = found.mean(0), sd = std::sqrt(found.covariance(0, 0));
   // Drawn with a kernel, as the others are: it may be narrower than a line.
   const Found line{VectorXd::Constant(1, mean), VectorXd::Ones(1), std::hypot(sd, 0.03)};
-  const auto below = [&](double x) { return 0.5 * std::erfc((mean - x) / (sd * M_SQRT2)); };
+  const auto below = [&](double x) { return NormalCdf((x - mean) / sd); };
   const auto near = [&](double mode) { return below(mode + kNear) - below(mode - kNear); };
   return Tabulate(
       grid, [&](double x) { return line.Density(x); }, near(kLightPayload), near(kHeavyPayload),

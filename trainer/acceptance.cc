@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "common/gaussian.h"
 #include "common/special_numbers.h"
 
 namespace plumb {
@@ -23,16 +24,16 @@ struct Normal {
   double mean = 0, variance = 0;
 };
 
-// Two independent measurements of one thing, by inverse-variance weighting.
+// Two independent measurements of one thing, by inverse-variance weighting; one of the
+// variances may be 0.
 Normal Fused(const Normal& a, const Normal& b) {
   const double sum = a.variance + b.variance;
-  if (sum == 0) return {(a.mean + b.mean) / 2, 0};
   return {(b.variance * a.mean + a.variance * b.mean) / sum, a.variance * b.variance / sum};
 }
 
 double ProbabilityPositive(const Normal& x) {
   if (x.variance == 0) return x.mean > 0 ? 1 : x.mean < 0 ? 0 : 0.5;
-  return std::erfc(-x.mean / std::sqrt(x.variance) / std::sqrt(2.0)) / 2;
+  return NormalCdf(x.mean / std::sqrt(x.variance));
 }
 
 }  // namespace

@@ -11,8 +11,7 @@
 namespace plumb {
 namespace {
 
-// Phi and its inverse, accurate in both tails.
-double NormalCdf(double u) { return 0.5 * std::erfc(-u * M_SQRT1_2); }
+// Inverse of NormalCdf, accurate in both tails.
 double NormalQuantile(double p) {
   if (!(p > 0)) return -kInfinity;
   if (!(p < 1)) return kInfinity;

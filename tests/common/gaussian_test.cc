@@ -39,6 +39,13 @@ TEST_CASE("the divergence of one normal distribution from another, in closed for
   CHECK(KlDivergence(q, p) == Approx(-std::log(4) + (4 + 4.) / 0.5 - 0.5));
 }
 
+TEST_CASE("the standard normal distribution, to the tails (Abramowitz and Stegun, table 26.1)") {
+  CHECK(NormalCdf(0) == 0.5);
+  CHECK(NormalCdf(1) == Approx(0.841344746068543).epsilon(1e-14));
+  CHECK(NormalCdf(-2) == Approx(0.0227501319481792).epsilon(1e-14));
+  CHECK(NormalCdf(-10) == Approx(7.61985302416053e-24).epsilon(1e-13).margin(0));
+}
+
 TEST_CASE("a precision is the covariance's inverse, and normals become the distribution's") {
   const Gaussian p = Correlated();
   CHECK((Precision(p) * p.covariance).isIdentity(1e-12));
