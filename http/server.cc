@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
 #include <list>
@@ -46,6 +47,8 @@ class HttpServer::Parts::Connection : public std::enable_shared_from_this<Connec
     Leave();
     stream_.close();
   }
+  /// Between its request's last byte and the last one of the answer.
+  bool in_answer() const { return in_answer_; }
 
  private:
   void Leave() {
@@ -54,6 +57,7 @@ class HttpServer::Parts::Connection : public std::enable_shared_from_this<Connec
   }
 
   void Read() {
+    in_answer_ = false;
     parser_.emplace();
     parser_->header_limit(kMaxHeader);
     parser_->body_limit(parts_->setting.longest_body);
@@ -81,6 +85,7 @@ class HttpServer::Parts::Connection : public std::enable_shared_from_this<Connec
       if (parts_->setting.upgrade(request_, stream_)) return Leave();
     }
     stream_.expires_never();  // the answer takes what it takes
+    in_answer_ = true;
     parts_->setting.answer(request_, [self = shared_from_this()](Response response) {
       self->Respond(std::move(response), true);
     });
@@ -105,10 +110,21 @@ class HttpServer::Parts::Connection : public std::enable_shared_from_this<Connec
   std::optional<http::request_parser<http::string_body>> parser_;
   Request request_;
   Response response_;
+  bool in_answer_ = false;
   std::optional<std::list<std::weak_ptr<Connection>>::iterator> place_;
 };
 
 namespace {
+
+void MakeRoom(const std::list<std::weak_ptr<HttpServer::Parts::Connection>>& connections) {
+  if (connections.size() < HttpServer::kMaxConnections) return;
+  auto oldest = std::find_if(connections.begin(), connections.end(), [](const auto& one) {
+    const auto connection = one.lock();
+    return connection && !connection->in_answer();
+  });
+  if (oldest == connections.end()) oldest = connections.begin();
+  if (const auto connection = oldest->lock()) connection->Close();
+}
 
 void Accept(const std::shared_ptr<HttpServer::Parts>& parts) {
   parts->acceptor.async_accept([parts](error_code error, tcp::socket socket) {
@@ -120,9 +136,7 @@ void Accept(const std::shared_ptr<HttpServer::Parts>& parts) {
       });
       return;
     }
-    if (parts->connections.size() >= HttpServer::kMaxConnections) {
-      if (const auto oldest = parts->connections.front().lock()) oldest->Close();
-    }
+    MakeRoom(parts->connections);
     std::make_shared<HttpServer::Parts::Connection>(parts, std::move(socket))->Begin();
     Accept(parts);
   });

@@ -16,8 +16,9 @@ namespace plumb {
 
 /// Answers requests over HTTP/1.1, on one thread, that of the context. Everything that comes in has
 /// a bound: headers 8 kB, bodies as many bytes as the setting says, kRequestTime for each request
-/// and kResponseTime for whoever reads slowly, and kMaxConnections, of which the oldest
-/// makes room for a new one. Not thread-safe.
+/// and kResponseTime for whoever reads slowly, and kMaxConnections, of which the oldest that asks
+/// for nothing, or if all are being answered the oldest, makes room for a new one.
+/// Not thread-safe.
 class HttpServer {
  public:
   static constexpr size_t kMaxConnections = 128;

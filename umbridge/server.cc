@@ -12,6 +12,9 @@
 namespace plumb {
 namespace {
 
+// There are connections left for others, so that no answer is given up for one of them.
+constexpr size_t kMaxPending = HttpServer::kMaxConnections / 2;
+
 Response Json(int status, std::string body) {
   return MakeResponse(static_cast<http::status>(status), "application/json", std::move(body));
 }
@@ -41,7 +44,7 @@ struct UmbridgeServer::Parts {
     }
     if (!request[http::field::origin].empty())
       return reply(Json(403, UmbridgeError("InvalidInput", "a page in a browser may not ask")));
-    if (pending == HttpServer::kMaxConnections)
+    if (pending == kMaxPending)
       return reply(Json(503, UmbridgeError("Busy", "too many requests wait already")));
     ++pending;
     asio::post(worker, [this, method = std::string(View(request.method_string())),

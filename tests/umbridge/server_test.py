@@ -18,6 +18,11 @@ TRUTH = [3.6, 4.1, 2.8, 5.2]
 PATIENCE = 120  # [s]; who is as late as that hangs
 
 
+def jacobian_request():
+    body = json.dumps({"name": "errors", "input": [TRUTH], "inWrt": 0, "outWrt": 0, "vec": [1, 0, 0, 0]}).encode()
+    return b"POST /ApplyJacobian HTTP/1.1\r\nHost: localhost\r\nContent-Length: %d\r\n\r\n%s" % (len(body), body)
+
+
 class Served(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -133,8 +138,7 @@ class Served(unittest.TestCase):
         self.works()
 
     def test_who_asks_and_goes_away_does_not_stand_in_others_way(self):
-        body = json.dumps({"name": "errors", "input": [TRUTH], "inWrt": 0, "outWrt": 0, "vec": [1, 0, 0, 0]}).encode()
-        request = b"POST /ApplyJacobian HTTP/1.1\r\nContent-Length: %d\r\n\r\n%s" % (len(body), body)
+        request = jacobian_request()
         for _ in range(1000):
             with socket.create_connection(self.address, PATIENCE) as connection:
                 connection.sendall(request)
@@ -158,6 +162,16 @@ class Served(unittest.TestCase):
         silent = [socket.create_connection(self.address, PATIENCE) for _ in range(200)]
         self.works()
         for connection in silent:
+            connection.close()
+
+    def test_who_says_nothing_costs_nobody_an_answer(self):
+        asking = [socket.create_connection(self.address, PATIENCE) for _ in range(40)]
+        for connection in asking:
+            connection.sendall(jacobian_request())
+        silent = [socket.create_connection(self.address, PATIENCE) for _ in range(200)]
+        for connection in asking:
+            self.assertIn(b" 200 OK", connection.recv(4096))
+        for connection in asking + silent:
             connection.close()
 
     def test_several_at_once_are_all_answered(self):
