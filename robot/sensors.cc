@@ -43,6 +43,9 @@ void ReadEncoder(Config& config, const RobotDescription& robot, SensorDescriptio
   s.sign = config.Integer("sign", {-1, 1}, 1);
   if (s.sign == 0) config.Fail("sign", "must be 1 or -1");
   s.offset = config.Number("offset", {-1e9, 1e9}, 0);
+  if (s.period * 1e3 < 1 - 1e-6 || std::abs(s.period * 1e3 - std::round(s.period * 1e3)) > 1e-6)
+    config.Fail("period",
+                "must be a whole number of milliseconds: an encoder's timer has no other");
   s.max_speed = config.Number("max_speed", {1e-3, 1e6});
   // Between two readings it must turn by less than half of what it can tell apart.
   const double half = s.range / s.counts * std::acos(-1.);

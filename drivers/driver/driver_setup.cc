@@ -21,14 +21,16 @@ constexpr int kHistory = 2048;  // cycles of transmitted efforts: 4 s of 2 ms
 
 // What nobody but us may send to that motor.
 std::vector<Filter> OwnFilters(const MotorDescription& motor, const DriverSettings& settings) {
+  const BusDevice device = MotorBusDevice(motor, settings);
   std::vector<Filter> own;
-  for (const BusMessage& message : MotorBusDevice(motor, settings).messages) {
+  for (const BusMessage& message : device.messages) {
     if (message.direction != BusMessage::Direction::kToDevice || message.remote) continue;
     own.push_back({.id = message.id,
                    .mask = (message.extended ? Filter::kAllExtended : 0x7FF) & ~message.sender_bits,
                    .own = true,
                    .extended = message.extended});
   }
+  for (const uint32_t id : device.obeys) own.push_back({.id = id, .mask = 0x7FF, .own = true});
   return own;
 }
 
@@ -91,6 +93,11 @@ Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
 }
 
 std::vector<Driver::Joint> Driver::DrivenJoints(const RobotDescription& robot) {
+  if (robot.task.period >= robot.driver.expiry)
+    throw std::invalid_argument(
+        fmt::format("[driver] expiry = {} s is not longer than [task] period = {} s: each command "
+                    "would be void before the next one comes",
+                    robot.driver.expiry, robot.task.period));
   std::vector<Joint> joints;
   for (size_t i = 0; i < robot.joints.size(); ++i) {
     if (!robot.joints[i].passive) joints.emplace_back(i, robot.joints[i], robot.driver);

@@ -49,6 +49,8 @@ struct BusDevice {
   std::string protocol;
   std::vector<BusMessage> messages;
   std::vector<IdRange> claims;  ///< of standard ids
+  /// Standard ids of what else it obeys: the driver sends none of it, and nobody else may.
+  std::vector<uint32_t> obeys = {};
 };
 
 }  // namespace plumb

@@ -82,6 +82,14 @@ inline constexpr Layout kSetInputTorque{
 inline constexpr Layout kSetInputTorqueShort{
     0x0E, "Set_Input_Torque", 4, {{F("Input_Torque", 0, "Nm")}}};
 inline constexpr Layout kClearErrors{0x18, "Clear_Errors", 1, {{U("Identify", 0, 8)}}};
+
+/// What else a drive obeys, in whatever mode it is: setpoints of position and velocity, both of
+/// which set the torque, too, parameters, limits and trajectories, a restart, another zero, gains,
+/// a new firmware.
+inline constexpr std::array<uint8_t, 13> kOtherCommands = {
+    kRxSdo.command, kSetInputPos.command, kSetInputVel.command,
+    0x0F, 0x10, 0x11, 0x12, 0x13,  // Set_Limits, anticogging, Set_Traj_...
+    0x16, 0x19, 0x1A, 0x1B, 0x1F}; // Reboot, Set_Absolute_Position, gains, Enter_DFU_Mode
 // clang-format on
 
 /// Reports that the driver asks for in turn while the robot moves.

@@ -120,11 +120,11 @@ void CanSimpleDevice::OnFrame(const Frame& frame, int64_t now) noexcept {
       }
       break;
     case kSetInputPos.command:
-      return OnSetpoint(kSetInputPos, frame, now);
+      return OnSetpoint(kSetInputPos, 2, frame, now);
     case kSetInputVel.command:
-      return OnSetpoint(kSetInputVel, frame, now);
+      return OnSetpoint(kSetInputVel, 1, frame, now);
     case kSetInputTorque.command:
-      return OnSetpoint(kSetInputTorque, frame, now);
+      return OnSetpoint(kSetInputTorque, 0, frame, now);
     case kClearErrors.command:
       if (DecodePayload(kClearErrors, frame)) {
         active_errors_ = disarm_reason_ = 0;
@@ -138,7 +138,8 @@ void CanSimpleDevice::OnFrame(const Frame& frame, int64_t now) noexcept {
   ++rejected_;
 }
 
-void CanSimpleDevice::OnSetpoint(const Layout& layout, const Frame& frame, int64_t now) noexcept {
+void CanSimpleDevice::OnSetpoint(const Layout& layout, size_t torque, const Frame& frame,
+                                 int64_t now) noexcept {
   const auto values = DecodePayload(layout, frame);
   if (!values || !AllFinite(layout, *values)) {
     ++rejected_;
@@ -146,8 +147,7 @@ void CanSimpleDevice::OnSetpoint(const Layout& layout, const Frame& frame, int64
   }
   fed_ = now;
   active_errors_ &= ~kWatchdogTimerExpired;  // the cause is gone; the disarm reason stays
-  if (&layout != &kSetInputTorque) return;
-  setpoint_ = (*values)[0];
+  setpoint_ = (*values)[torque];
   ++setpoints_;
 }
 

@@ -87,7 +87,8 @@ class CanSimpleDevice {
  private:
   void RequestState(int state, int64_t now) noexcept;
   void FallIdle(uint32_t reason) noexcept;
-  void OnSetpoint(const Layout& layout, const Frame& frame, int64_t now) noexcept;
+  /// @param torque which of the layout's fields it is; the drive obeys no other
+  void OnSetpoint(const Layout& layout, size_t torque, const Frame& frame, int64_t now) noexcept;
   void CheckWatchdog(int64_t now) noexcept;
   Frame Report(uint8_t command, const Sample& sample) const noexcept;
 

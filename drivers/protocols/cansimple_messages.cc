@@ -48,6 +48,7 @@ BusDevice CanSimpleBusDevice(const MotorDescription& motor, const DriverSettings
     device.messages.back().shared = true;
     device.messages.back().remote = layout.command == kAddress.command;
   }
+  for (const uint8_t command : kOtherCommands) device.obeys.push_back(block | command);
   return device;
 }
 

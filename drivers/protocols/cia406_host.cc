@@ -16,9 +16,9 @@ using namespace cia406;
 constexpr int64_t kRetry = 500'000;            // [us] between two attempts to start it
 constexpr int64_t kHeartbeatPeriod = 100'000;  // [us] assumed for the bus plan
 
-/// [ms] of the event timer: whole, and not slower than asked for.
+/// [ms] of the event timer, which robot.toml's period is a whole number of.
 int EventTimer(const SensorDescription& description) {
-  return std::max(1, static_cast<int>(std::floor(description.period * 1e3 + 1e-6)));
+  return std::max(1, static_cast<int>(std::lround(description.period * 1e3)));
 }
 
 class Cia406Encoder : public Sensor {

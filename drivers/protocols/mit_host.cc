@@ -17,8 +17,9 @@ using namespace mit;
 constexpr int kZeroFrames = 3;  // frames of zero gains before "enter"
 constexpr int kEnters = 2;      // one of them may be lost on the bus
 constexpr int kRepliesToArm = 2;
-constexpr double kUneven = 0.01;  // [s] by which replies may come early or late
-constexpr double kUnmoved = 0.1;  // [rad] that a joint may have sagged by in a silence
+constexpr double kUneven = 0.01;               // [s] by which replies may come early or late
+constexpr double kUnmoved = 0.1;               // [rad] that a joint may have sagged by in a silence
+constexpr int64_t kShortestRestart = 100'000;  // [us] of silence
 
 enum class Step { kRest, kZeros, kEnter, kAwait, kArmed, kDisarming };
 
@@ -125,13 +126,13 @@ class MitMotor : public AnsweringMotor<Step> {
 
   /// Turns are counted from one reply to the next. In a silence the motor may have lost its power,
   /// and with it the turns: where it then is elsewhere, nobody knows whether it was turned or
-  /// counts from elsewhere.
+  /// counts from elsewhere. Where it is as it was, the turns are, too.
   /// @param raw [rad] position of a reply.
   void Track(double raw, int64_t now) noexcept {
     const double step = std::remainder(raw - raw_, Period(ranges_));
     const int64_t dt = now - answered();
     const bool displaced = std::exchange(displaced_, false);
-    const bool silent = !present() || dt > heartbeat_timeout();
+    const bool silent = !present() || dt > std::min(heartbeat_timeout(), kShortestRestart);
     raw_ = raw;
     if (!heard() || displaced) {
       estimate_.position = raw;

@@ -19,7 +19,8 @@ namespace plumb {
 ///
 /// The zero of the position is never touched. Replies wrap every 25 rad (of +-12.5): the position
 /// is unwrapped, and a step that the greatest velocity does not explain is a fault. After a silence
-/// of heartbeat_timeout, as at the start, the turns are unknown and counted anew.
+/// of 0.1 s or heartbeat_timeout it has lost its place, unless it is where it was. At the start it
+/// is taken to be within +-12.5 rad.
 /// @throws std::invalid_argument if the node is not in [1, 0xFF], the id of the replies not in [0,
 /// 0x7FF] or equal to the node, a range is not positive or missing. Thread-safe.
 std::unique_ptr<Motor> MakeMitMotor(const MotorDescription& description, const MotorTiming& timing);

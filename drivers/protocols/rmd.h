@@ -33,6 +33,8 @@ namespace plumb::rmd {
 inline constexpr int kMaxNode = 32;
 inline constexpr uint32_t kCommands = 0x140, kAnswers = 0x240;
 inline constexpr uint32_t kAllMotors = 0x280;  ///< commands to every motor on the bus
+/// Of the motion mode, which a motor obeys whatever else it is told.
+inline constexpr uint32_t kMotionCommands = 0x400, kMotionAnswers = 0x500;
 
 /// The first byte of commands and answers.
 enum Code : uint8_t {

@@ -12,7 +12,12 @@ BusDevice RmdBusDevice(const MotorDescription& motor, const DriverSettings& driv
   using Direction = BusMessage::Direction;
   const auto node = static_cast<uint32_t>(motor.node);
   const int64_t cycle = Microseconds(driver.cycle), telemetry = Microseconds(driver.telemetry);
-  BusDevice device{.name = "", .protocol = "rmd", .messages = {}, .claims = {}};
+  const uint32_t motion = kMotionCommands + node, motion_answer = kMotionAnswers + node;
+  BusDevice device{.name = "",
+                   .protocol = "rmd",
+                   .messages = {},
+                   .claims = {{motion, motion}, {motion_answer, motion_answer}},
+                   .obeys = {motion}};
   const auto add = [&](const Layout& layout, Direction direction, int64_t period) -> BusMessage& {
     BusMessage& message = device.messages.emplace_back();
     message.layout = layout;

@@ -112,6 +112,9 @@ TEST_CASE("sensors: what is refused") {
   refused("base = 0x380", "base = 0x7C0", "base");
   refused("rpy = [0, 0, 1.5707963267948966]", "rpy = [0, 0]", "rpy");
   refused("period = 0.005", "period = 0", "period");
+  for (const char* period : {"0.0005", "0.0025"})
+    refused("node = 1\nperiod = 0.002", std::string("node = 1\nperiod = ") + period,
+            "whole number of milliseconds");
 }
 
 TEST_CASE("noise: of a count, of an IMU, of a joint") {

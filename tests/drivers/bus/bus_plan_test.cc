@@ -159,6 +159,13 @@ TEST_CASE("collisions name both and the id") {
     CHECK_THAT(PlanBus(Motors({MitMotor(3, 0), MitMotor(4, 3)}), 1e6).errors.front(),
                Contains("0x003: 'motor3' obeys Command and 'motor4' sends Reply"));
   }
+  SECTION("an ODrive's estimates are an RMD motor's commands of motion") {
+    MotorDescription motor;
+    motor.protocol = "cansimple";
+    motor.node = 32;
+    CHECK(PlanBus(Motors({motor, RmdMotor(9)}, 0.01), 1e6).errors.front() ==
+          "CAN id 0x409 is both 'motor32's and 'motor9's");
+  }
   SECTION("MIT replies on one id: allowed, and warned of") {
     const BusPlan plan = PlanBus(Motors({MitMotor(3, 0), MitMotor(4, 0)}, 0.002), 1e6);
     CHECK(plan.errors.empty());

@@ -96,7 +96,7 @@ TEST_CASE("fault 8: frames come faster than they are read", "[fault]") {
                      [](BusRig& rig) {
                        rig.driver_stopped = true;
                        for (int i = 0; i < 30; ++i) {
-                         for (int k = 0; k < 200; ++k) rig.StrangerSends("03F#0102030405060708");
+                         for (int k = 0; k < 200; ++k) rig.StrangerSends("03E#0102030405060708");
                          rig.Step();
                        }
                        rig.driver_stopped = false;
@@ -151,7 +151,7 @@ TEST_CASE("fault 10: frames that are not what they look like", "[fault]") {
              rig.each_millisecond.push_back([&rig] {
                for (const char* text :
                     {"029#000080BE", "029#0000C07F00006040", "029#00008040000080FF",
-                     "029#FFFFFFFFFFFFFFFF", "021#000000000800", "03F#",
+                     "029#FFFFFFFFFFFFFFFF", "021#000000000800", "03E#",
                      "00000029#0000803F0000803F", "029##00000803F0000803F",
                      "00000021#0000000001000000", "021##00000000001000000", "0A9#0000803F0000803F",
                      "0A1#0000000001000000", "7FF#01", "123#DEADBEEF"}) {

@@ -284,7 +284,7 @@ TEST_CASE("frames that only look like ours are not") {
   CHECK(rig.driver->state() == DriveState::kArmed);
   CHECK(rig.Status().buses[0].frames_rejected == rejected + 6);  // error frames are no frames
   for (const char* text : {"029#000080BE", "029#0000C07F00006040", "029#00008040000080FF",
-                           "021#000000000800", "03F#", "029#"}) {
+                           "021#000000000800", "03E#", "029#"}) {
     rig.Inject(text);
   }
   while (rig.driver->NextState()) FAIL("a state from malformed frames");

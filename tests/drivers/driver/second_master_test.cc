@@ -11,9 +11,12 @@ namespace {
 
 using Catch::Matchers::Contains;
 
-Frame Foreign(const char* text) {
+// As the transport marks it that was given the driver's filters.
+Frame FromAnother(const Driver& driver, const char* text) {
   Frame frame = FrameFromText(text).value();
-  frame.foreign = true;
+  frame.foreign = std::ranges::any_of(driver.filters(0), [&](const Filter& filter) {
+    return filter.own && !filter.extended && (frame.id & filter.mask) == (filter.id & filter.mask);
+  });
   return frame;
 }
 
@@ -38,11 +41,13 @@ TEST_CASE(
   Rig rig(2);
   rig.Start();
   const auto obeyed =
-      GENERATE("02E#0000C03F", "04E#0000C03F00000000", "027#08000000", "02C#0000003F24FAFA00");
+      GENERATE("02E#0000C03F", "04E#0000C03F00000000", "027#08000000", "02C#0000003F24FAFA00",
+               "02D#000000C00000003E", "024#0101010000000000", "02F#000000400000A040", "036#00",
+               "039#00000000", "03B#00000000");
   SECTION("armed") {
     REQUIRE(rig.Arm(1));
     rig.Run(50);
-    rig.driver->OnFrame(0, Foreign(obeyed), rig.now, rig.utime());
+    rig.driver->OnFrame(0, FromAnother(*rig.driver, obeyed), rig.now, rig.utime());
     CHECK(rig.driver->state() == DriveState::kFault);
     CHECK_THAT(rig.Reason(), Contains("second master") &&
                                  Contains(fmt::format("{:#05x}", FrameFromText(obeyed)->id)));
@@ -53,7 +58,7 @@ TEST_CASE(
   }
   SECTION("before") {
     rig.Run(300);
-    rig.driver->OnFrame(0, Foreign(obeyed), rig.now, rig.utime());
+    rig.driver->OnFrame(0, FromAnother(*rig.driver, obeyed), rig.now, rig.utime());
     rig.Request(driver_request_t::ARM);
     CHECK(rig.driver->state() != DriveState::kArming);
     CHECK_THAT(rig.Reason(), Contains("second master"));
@@ -69,7 +74,7 @@ TEST_CASE("an emergency stop that somebody sends on the bus is everybody's, and 
   REQUIRE(rig.Arm(1));
   rig.Run(50);
   const auto frame = GENERATE("022#", "042#", "7E2#");  // to one drive, to the other, to all
-  rig.driver->OnFrame(0, Foreign(frame), rig.now, rig.utime());
+  rig.driver->OnFrame(0, FromAnother(*rig.driver, frame), rig.now, rig.utime());
   CHECK(rig.driver->state() == DriveState::kFault);
   CHECK(rig.Reason() == "emergency stop from the bus");
   CHECK(rig.Status().stopped_by_request);
@@ -98,6 +103,15 @@ TEST_CASE("the transport is asked to tell another's commands from ours, for ever
   CHECK(received[1].foreign);
   CHECK_FALSE(received[2].foreign);  // a drive's
   CHECK(driver_end->stats().foreign == 2);
+}
+
+TEST_CASE("a second master of RMD motors is heard in the motion mode, too") {
+  const char* source = std::getenv("PLUMBLINE_SOURCE");
+  const Driver driver(LoadRobot(std::string(source ? source : ".") + "/robots/pendulum/rmd.toml"),
+                      0, Rig::kEpoch);
+  CHECK(FromAnother(driver, "141#A100000064000000").foreign);
+  CHECK(FromAnother(driver, "401#7FFF7FF000000FFF").foreign);
+  CHECK_FALSE(FromAnother(driver, "241#A100000064000000").foreign);
 }
 
 TEST_CASE("a recording is no robot") {

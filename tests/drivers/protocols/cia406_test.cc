@@ -243,6 +243,8 @@ TEST_CASE("a restart, a stop and an emergency are faults") {
     CHECK(bench.Reason() == "it reports error 0x5000 (register 0x01)");
     bench.device.Emergency(0);  // error reset: the fault stays
     bench.Run(1);
+    CHECK(bench.sensor->state() == SensorState::kFault);
+    CHECK(bench.Reason() == "it reports error 0x5000 (register 0x01)");
   }
   CHECK((bench.sensor->state() == SensorState::kFault ||
          bench.sensor->state() == SensorState::kRunning));

@@ -183,6 +183,18 @@ TEST_CASE("turns survive a silence only where the motor has not moved meanwhile"
   }
 }
 
+TEST_CASE("a motor that has had no power for a moment has lost its place") {
+  const int silence = GENERATE(110, 150, 190);  // [ms]; of 200 it counts as absent
+  Bench bench;
+  bench.Run(50);
+  bench.to_device = [](const Frame&) { return false; };
+  bench.Run(silence);
+  bench.to_device = nullptr;
+  bench.sample.position += 1.047;  // a turn of the rotor, behind a gear of six
+  bench.Run(60);
+  CHECK(bench.motor->lost_place());
+}
+
 TEST_CASE("nothing but finite torques within the range is sent, and the others are counted") {
   Bench bench;
   CHECK(bench.Arm());
