@@ -20,7 +20,8 @@ namespace plumb {
 namespace {
 
 constexpr int64_t kStatisticsPeriod = 500'000, kStatusPeriod = 1'000'000;  // [us]
-constexpr int64_t kRewindPeriod = 100'000;  // [us]; that one has been is not news any faster
+constexpr size_t kLongestOfOthers = 64 << 10;  // [bytes] of a channel that is not of the page
+constexpr int64_t kRewindPeriod = 100'000;     // [us]; that one has been is not news any faster
 
 // In the order of their numbers, from 1 on.
 constexpr std::string_view kServices[] = {"emergency_stop", "arm", "disarm", "confirm_placed"};
@@ -115,7 +116,8 @@ void Gateway::OnMessage(const std::string& name, std::span<const uint8_t> messag
                     numbers.words());
   }
   Use(name, message, repeated, moment);
-  channel->last.assign(content.begin(), content.end());
+  const bool kept = content.size() <= kLongestOfOthers || IsChannelOfPage(name);
+  channel->last.assign(content.begin(), kept ? content.end() : content.begin());
 }
 
 /// A log is played from an earlier place on, or another run has begun: what was said later has not

@@ -67,7 +67,7 @@ class ViewerConnection : public Connection, public std::enable_shared_from_this<
   }
 
   void Join() {
-    if (parts_->ended) return;
+    if (!place_) return;  // closed meanwhile
     joined_ = true;
     socket_.binary(true);
     parts_->gateway.Join(viewer_);
@@ -76,7 +76,8 @@ class ViewerConnection : public Connection, public std::enable_shared_from_this<
 
   void Read() {
     socket_.async_read(buffer_, [self = shared_from_this()](error_code error, size_t) {
-      if (error || self->parts_->ended) return self->Close();
+      // What was read before it was closed comes yet.
+      if (error || !self->joined_) return self->Close();
       self->Take();
       self->buffer_.consume(self->buffer_.size());
       self->Read();

@@ -64,6 +64,7 @@ class HttpServer::Parts::Connection : public std::enable_shared_from_this<Connec
     stream_.expires_after(HttpServer::kRequestTime);
     http::async_read(stream_, buffer_, *parser_,
                      [self = shared_from_this()](error_code error, size_t) {
+                       if (!self->place_) return;  // closed meanwhile
                        if (error) return self->OnBadRequest(error);
                        self->OnRequest();
                      });

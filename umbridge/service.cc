@@ -16,7 +16,7 @@ namespace {
 using nlohmann::json;
 
 constexpr double kProtocolVersion = 1.0;
-constexpr size_t kLongestInput = 32;               // [bytes], with what stands around it
+constexpr size_t kLongestInput = 40;               // [bytes], with what stands around it
 constexpr size_t kRequestBesideNumbers = 4 << 10;  // [bytes] of a request
 
 struct Refusal {

@@ -130,7 +130,7 @@ def test_a_rank_that_dies(cluster, plumb, robots, folder):
         os.kill(rank, signal.SIGKILL)
     said = going.communicate(timeout=60)[0]
     assert going.returncode != 0, said
-    assert "signal 9" in said and HOSTS[1] in said or "second" in said, said
+    assert "signal 9" in said and (HOSTS[1] in said or "second" in said), said
     assert not cluster.ranks_there(plumb)
     assert not broken.exists()
     run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

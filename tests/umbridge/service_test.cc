@@ -129,10 +129,20 @@ TEST_CASE("um-bridge: what is wrong is answered with an error, and nothing else 
 }
 
 TEST_CASE("um-bridge: every right request is short enough") {
-  std::string longest =
-      R"({"name": "products", "config": {}, "inWrt": 0, "outWrt": 0, "input": [[)";
-  for (int i = 0; i < 5; ++i) longest += "-1.2345678901234567e-123, ";
-  CHECK(longest.size() < Service().longest_request());
+  constexpr int kInputs = 50, kOutputs = 10000;
+  const UmbridgeService service({{"many", kInputs, kOutputs, &Edge}});
+  const auto numbers = [](int count) {
+    return std::vector<double>(count, -1.2345678901234567e-123);
+  };
+  const json longest{{"name", "many"},
+                     {"config", json::object()},
+                     {"inWrt", 0},
+                     {"outWrt", 0},
+                     {"input", {numbers(kInputs)}},
+                     {"sens", numbers(kOutputs)},
+                     {"vec", numbers(kInputs)}};
+  CHECK(longest.dump(4).size() < service.longest_request());
+  CHECK(longest.dump(4).size() > service.longest_request() / 2);
 }
 
 }  // namespace plumb
