@@ -112,11 +112,13 @@ void AddExport(CLI::App& app, Action& action) {
   CLI::App* export_log = AddCommand(
       app, "export", "write what a log has for Foxglove, Lichtblick, PlotJuggler, spreadsheets");
   export_log->add_option("log", flags->log, "LCM log")->required();
-  export_log->add_option("--mcap", flags->mcap,
-                         "an MCAP file: messages in JSON, and the robot in pictures");
+  auto* mcap = export_log->add_option("--mcap", flags->mcap,
+                                      "an MCAP file: messages in JSON, and the robot in pictures");
   export_log->add_option("--csv", flags->csv, "a folder: a table for each channel");
-  export_log->add_option("--robot", flags->robot,
-                         "robot folder or TOML file; default: the one beside the log");
+  export_log
+      ->add_option("--robot", flags->robot,
+                   "robot folder or TOML file; default: the one beside the log")
+      ->needs(mcap);
   SetAction(*export_log, action, [flags] { return Export(*flags); });
 }
 
@@ -199,7 +201,8 @@ void AddRobotAndClockFlags(CLI::App& launch, CLI::Option* key, LaunchFlags& flag
 void AddRecordingFlags(CLI::App& launch, LaunchFlags& flags) {
   launch.add_option("--log", flags.log, "record all messages to this LCM log");
   launch.add_flag("--overwrite", flags.overwrite,
-                  "write over a log that no run in virtual time of this robot would make again");
+                  "write over a log of messages or frames that no run in virtual time of this "
+                  "robot would make again");
   launch
       .add_option("--can-log", flags.can_log,
                   "in virtual time: record all frames to this file, as candump -l does")
@@ -248,10 +251,12 @@ void AddLaunch(CLI::App& app, const std::string& line, Action& action) {
     return Launch(process, *flags);
   };
   SetAction(*launch, action, launches, [flags]() -> std::string {
-    const bool in_vain = flags->priority != 0 && !flags->real_time && !flags->real;
-    return in_vain ? "--realtime-priority needs --real-time or --real: in virtual time there are "
-                     "no priorities"
-                   : "";
+    if (flags->priority != 0 && !flags->real_time && !flags->real)
+      return "--realtime-priority needs --real-time or --real: in virtual time there are no "
+             "priorities";
+    if (flags->overwrite && flags->log.empty() && flags->can_log.empty())
+      return "--overwrite needs --log or --can-log";
+    return "";
   });
 }
 

@@ -72,6 +72,10 @@ void RequireProcessFiles(const Process& process, const LaunchFlags& flags,
   if (!flags.overwrite)
     RequireOverwritable(flags.log, flags.real || flags.real_time ? "" : robot.name);
   RequireSameKind(flags.can_log, "(", "a log of candump's");
+  // Its frames' dates begin where virtual time does.
+  if (!flags.overwrite)
+    RequireSameKind(flags.can_log, fmt::format("({}", Coordinator::kBeginning / 1'000'000'000),
+                    "a run's in virtual time (--overwrite)");
   RequireSameKind(flags.summary, "{\n \"bus\": ", "a run's summary");
   RequireSameKind(flags.report, LaunchReportBegins(), "a report of ours");
 }

@@ -42,10 +42,11 @@ void AddSim(CLI::App& app, Action& action) {
   sim->add_flag("--urdf", flags->urdf,
                 "the robot as its URDF and TOML tables have it, without the prior's means")
       ->excludes(posterior);
+  auto* csv = sim->add_option("--csv", flags->csv, "write every step to this file");
   sim->add_option("--noise", flags->noise,
                   "SD or SD,SD of what sensors add to every q [rad or m] and v [rad/s or "
-                  "m/s] in the files; one number is for both");
-  sim->add_option("--csv", flags->csv, "write every step to this file");
+                  "m/s] in that file; one number is for both")
+      ->needs(csv);
   sim->add_option("--png", flags->png, "draw the first episode as a strip of snapshots");
   sim->add_option("--gif", flags->gif, "draw the first episode as a film");
   SetAction(*sim, action, [flags](Process& process) { return Simulate(process, *flags); });
@@ -212,15 +213,19 @@ void AddTrain(CLI::App& app, const std::string& line, Action& action) {
       ->add_option("--worst-after", flags->worst_after,
                    "updates that learn from all episodes first; default: robot.toml's")
       ->check(CLI::Range(0, 1000000000));
-  train
-      ->add_option("--evaluate-every", flags->evaluate_every,
-                   "updates, for the table's evaluation_return; 0 = never")
-      ->check(CLI::Range(0, 1000000))
-      ->capture_default_str();
+  const auto* every = train
+                          ->add_option("--evaluate-every", flags->evaluate_every,
+                                       "updates, for the table's evaluation_return; 0 = never")
+                          ->check(CLI::Range(0, 1000000))
+                          ->capture_default_str();
   train->add_option("--held-out", flags->held_out, "simulators to judge the policy by")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
-  SetAction(*train, action, [flags](Process& process) { return Train(process, *flags); });
+  const auto trains = [flags](Process& process) { return Train(process, *flags); };
+  SetAction(*train, action, trains, [flags, every]() -> std::string {
+    const bool in_vain = every->count() > 0 && flags->csv.empty() && flags->report.empty();
+    return in_vain ? "--evaluate-every needs --csv or --report" : "";
+  });
 }
 
 void AddExportModel(CLI::App& app, Action& action) {
@@ -232,12 +237,15 @@ void AddExportModel(CLI::App& app, Action& action) {
                            "a posterior.json; default: what robot.toml says, the prior");
   export_model->add_option("--urdf", flags->urdf, "the robot's URDF with the parameters' means");
   export_model->add_option("--mjcf", flags->mjcf, "the same robot as MuJoCo's XML");
-  export_model->add_option("--randomisation", flags->randomisation,
-                           "mean, covariance and samples of the parameters (JSON)");
+  auto* randomisation =
+      export_model->add_option("--randomisation", flags->randomisation,
+                               "mean, covariance and samples of the parameters (JSON)");
   export_model->add_option("--samples", flags->samples, "of the parameters")
+      ->needs(randomisation)
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
   export_model->add_option("--seed", flags->seed, "of all random numbers")
+      ->needs(randomisation)
       ->check(SeedRange())
       ->capture_default_str();
   SetAction(*export_model, action, [flags] { return ExportModel(*flags); });

@@ -58,7 +58,10 @@ int main(int argc, char** argv) try {
       mujoco.Step(t.efforts);
     }
   }
-  std::ofstream(argv[4]) << table;
+  std::ofstream motion(argv[4]);
+  motion << table;
+  motion.close();
+  if (!motion) throw std::runtime_error(std::string(argv[4]) + ": cannot be written");
 } catch (const std::exception& error) {
   std::fprintf(stderr, "%s\n", error.what());
   return 1;

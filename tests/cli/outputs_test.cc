@@ -122,6 +122,41 @@ TEST_CASE("a recording that cannot be made again is not written over unasked") {
   CHECK(ReadFile(log) == recorded);
 }
 
+TEST_CASE("frames of a real bus are not written over unasked, those of a run in virtual time are") {
+  const TemporaryFolder folder;
+  const std::string log = folder / "can.log", real = "(1796072996.000000) can0 029#0000\n";
+  std::ofstream(log) << real;
+  const std::string launch = "launch " + Robot("pendulum") + " --bus loop: --output " +
+                             (folder / "run") + " --can-log " + log;
+  const Outcome outcome = Shell(Plumb() + launch);
+  CHECK(outcome.status == 1);
+  CHECK_THAT(outcome.text, Catch::Contains("can.log: is there and not a run's in virtual time"));
+  CHECK(ReadFile(log) == real);
+  // These come as far as a policy that is not there.
+  const auto passes = [&](const std::string& more) {
+    const Outcome later = Shell(Plumb() + launch + more + " --policy " + (folder / "none.onnx"));
+    CHECK_THAT(later.text, Catch::Contains("none.onnx") && !Catch::Contains("virtual time"));
+  };
+  passes(" --overwrite");
+  std::ofstream(log) << "(1700000001.250000) can0 029#0000\n";
+  passes("");
+}
+
+TEST_CASE("an option that would have no effect is refused") {
+  for (const auto& [command, words] : std::map<std::string, std::string>{
+           {"sim " + Robot("pendulum") + " --noise 0.1", "--noise requires --csv"},
+           {"train " + Robot("pendulum") + " --evaluate-every 1", "needs --csv or --report"},
+           {"export a.lcmlog --csv a --robot b", "--robot requires --mcap"},
+           {"export-model a --urdf b --samples 3", "--samples requires --randomisation"},
+           {"export-model a --urdf b --seed 3", "--seed requires --randomisation"},
+           {"launch " + Robot("pendulum") + " --overwrite", "needs --log or --can-log"}}) {
+    const Outcome outcome = Shell(Plumb() + command);
+    INFO(command << "\n" << outcome.text);
+    CHECK(outcome.status == 2);
+    CHECK_THAT(outcome.text, Catch::Contains(words));
+  }
+}
+
 TEST_CASE("commands refuse to write two outputs into one file, before anything is computed") {
   const TemporaryFolder folder;
   const std::string file = folder / "same", again = folder / "./same", pendulum = Robot("pendulum");

@@ -132,10 +132,11 @@ TEST_CASE("sim: errors say what to do") {
   CHECK_THAT(complaint(Robot("pendulum") + " --set gravity=nine"), Contains("gravity=nine"));
   for (const char* noise :
        {"-0.1", "nan", "inf", "1e999", "0.1,-1", "0.1,", ",0.1", "0.1,0.2,0.3", "little"}) {
-    CHECK_THAT(complaint(Robot("pendulum") + " --noise=" + noise),
+    CHECK_THAT(complaint(Robot("pendulum") + " --csv /nonexistent/a.csv --noise=" + noise),
                Contains(std::string("--noise ") + noise + ": expected a standard deviation"));
   }
-  CHECK_THAT(complaint(Robot("pendulum") + " --noise ''"), Contains("expected a standard"));
+  CHECK_THAT(complaint(Robot("pendulum") + " --csv /nonexistent/a.csv --noise ''"),
+             Contains("expected a standard"));
   CHECK_THAT(complaint(Robot("pendulum") + " --csv /nonexistent/a.csv"),
              Contains("/nonexistent/a.csv"));
   CHECK_THAT(complaint(Robot("pendulum") + " --png /"), Contains("folder"));
