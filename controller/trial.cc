@@ -1,6 +1,13 @@
 #include "controller/trial.h"
 
+#include <algorithm>
+
 namespace plumb {
+
+Trial Trial::Stopped(int steps, double sum_of_rewards) {
+  const double rate = std::min(0., sum_of_rewards / std::max(1, steps));
+  return {steps, sum_of_rewards, rate, rate == 0};
+}
 
 void Trial::Add(double reward, int planned) {
   sum_of_rewards += reward;

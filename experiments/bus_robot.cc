@@ -176,15 +176,15 @@ RobotEpisode BusRobot::Episode(const policy_t& policy, const Controller::Decide&
   stopped_ = status.phase == controller_status_t::COMPLETE ? "" : status.reason;
   RobotEpisode episode;
   if (!decide) episode.rollout = loop.Join();
-  episode.sum_of_rewards = counts ? status.returns.back() : status.episode_return;
+  episode.trial = counts ? Trial{status.steps.back(), status.returns.back(),
+                                 status.late_rate.back(), status.fell.back() != 0}
+                         : Trial::Stopped(status.step, status.episode_return);
+  episode.sum_of_rewards =
+      counts ? status.returns.back() : episode.trial.WholeReturn(model.task.steps);
   episode.seconds = status.step * model.task.period;
   const robot_state_t& last = loop.last();
   episode.last_q = Eigen::VectorXd::Map(last.q.data(), static_cast<Eigen::Index>(last.q.size()));
   episode.last_v = Eigen::VectorXd::Map(last.v.data(), static_cast<Eigen::Index>(last.v.size()));
-  // One that was stopped has failed.
-  episode.trial = counts ? Trial{status.steps.back(), status.returns.back(),
-                                 status.late_rate.back(), status.fell.back() != 0}
-                         : Trial{status.step, status.episode_return, 0, true};
   return episode;
 }
 

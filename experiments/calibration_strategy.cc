@@ -55,15 +55,15 @@ std::unique_ptr<SimOpt> MakeSimOpt(CalibrationStrategy strategy, const RobotDesc
 
 ParameterDistribution FirstDistribution(CalibrationStrategy strategy, const RobotDescription& robot,
                                         const Eigen::VectorXd& truth) {
+  if (strategy == CalibrationStrategy::kNominal) return ParameterDistribution::Nominal(robot);
   ParameterDistribution distribution = ParameterDistribution::Prior(robot);
   Gaussian& component = distribution.mixture.components.at(0);
   if (strategy == CalibrationStrategy::kOracle) {
     for (Eigen::Index i = 0; i < truth.size(); ++i) {
       component.mean(i) = robot.parameters[static_cast<size_t>(i)].ToCoordinate(truth(i));
     }
-  }
-  if (strategy == CalibrationStrategy::kOracle || strategy == CalibrationStrategy::kNominal)
     component.covariance.setZero();
+  }
   return distribution;
 }
 

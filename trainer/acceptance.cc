@@ -44,13 +44,21 @@ Acceptance::Simulated Acceptance::Simulated::Of(std::span<const double> challeng
     throw std::invalid_argument(
         fmt::format("{} simulated returns of the challenger, {} of the incumbent",
                     challenger.size(), incumbent.size()));
-  std::vector<double> differences;
-  for (size_t i = 0; i < challenger.size(); ++i)
+  std::vector<double> challengers, incumbents, differences;
+  for (size_t i = 0; i < challenger.size(); ++i) {
+    if (!std::isfinite(challenger[i] - incumbent[i])) continue;
+    challengers.push_back(challenger[i]);
+    incumbents.push_back(incumbent[i]);
     differences.push_back(challenger[i] - incumbent[i]);
-  const auto pairs = std::count_if(differences.begin(), differences.end(),
-                                   [](double x) { return std::isfinite(x); });
-  return {Evaluate(challenger).mean, Evaluate(incumbent).mean,
-          Scatter(differences) / std::sqrt(static_cast<double>(std::max<ptrdiff_t>(pairs, 1)))};
+  }
+  const double pairs = std::max<double>(static_cast<double>(differences.size()), 1);
+  return {Evaluate(challengers).mean, Evaluate(incumbents).mean,
+          Scatter(differences) / std::sqrt(pairs)};
+}
+
+Acceptance::Beginnings Acceptance::Beginnings::Of(std::span<const double> trials,
+                                                  std::span<const double> whole) {
+  return {Evaluate(trials).mean, Scatter(trials), Scatter(whole)};
 }
 
 void Acceptance::Add(int iteration, const Trial& trial) {
@@ -80,18 +88,30 @@ double Acceptance::MeanReturn(int iteration) const {
   return sum / static_cast<double>(found->second.size());
 }
 
-double Acceptance::Better(int challenger, double scatter, const Simulated& simulated) const {
+int Acceptance::longest_trial() const {
+  int longest = 0;
+  for (const auto& [policy, trials] : trials_)
+    for (const Trial& trial : trials) longest = std::max(longest, trial.steps);
+  return longest;
+}
+
+double Acceptance::Better(int challenger, const Beginnings& beginnings,
+                          const Simulated& simulated) const {
   const auto variance = [&](int iteration) {
-    const double sd = std::max(scatter, kScatter * std::abs(MeanReturn(iteration)));
+    const double sd = beginnings.decide() ? beginnings.trial_sd
+                                          : std::max(beginnings.whole_sd,
+                                                     kScatter * std::abs(MeanReturn(iteration)));
     return sd * sd / static_cast<double>(trials_.at(iteration).size());
   };
   Normal difference{MeanReturn(challenger) - MeanReturn(incumbent_),
                     variance(challenger) + variance(incumbent_)};
   const double in_simulation = simulated.challenger - simulated.incumbent;
   if (std::isfinite(in_simulation)) {
-    if (scatter > kBeginnings * std::abs(MeanReturn(challenger))) {
+    if (beginnings.decide()) {
       const double sd = std::hypot((1 - kSimulated) * in_simulation, simulated.difference_sd);
-      difference = Fused(difference, {in_simulation, sd * sd});
+      const double apart = difference.mean - in_simulation;
+      difference = Fused(difference,
+                         {in_simulation, std::max(sd * sd, apart * apart - difference.variance)});
     } else {
       difference.mean += kSimulated * in_simulation;
     }
@@ -99,11 +119,11 @@ double Acceptance::Better(int challenger, double scatter, const Simulated& simul
   return ProbabilityPositive(difference);
 }
 
-Acceptance::Decision Acceptance::Decide(int challenger, double scatter,
+Acceptance::Decision Acceptance::Decide(int challenger, const Beginnings& beginnings,
                                         const Simulated& simulated) {
   Decision decision;
   decision.challenger = challenger, decision.incumbent = incumbent_;
-  decision.probability = Better(challenger, scatter, simulated);
+  decision.probability = Better(challenger, beginnings, simulated);
   decision.challenger_return = MeanReturn(challenger);
   decision.incumbent_return = MeanReturn(incumbent_);
   decision.simulated = simulated;
@@ -112,7 +132,7 @@ Acceptance::Decision Acceptance::Decide(int challenger, double scatter,
   return decision;
 }
 
-Acceptance::Decision Acceptance::Trust(int challenger, double scatter) {
+Acceptance::Decision Acceptance::Trust(int challenger, const Beginnings& beginnings) {
   const auto tried = [&](int iteration) { return trials_.contains(iteration); };
   Decision decision;
   decision.challenger = challenger, decision.incumbent = incumbent_;
@@ -122,20 +142,21 @@ Acceptance::Decision Acceptance::Trust(int challenger, double scatter) {
   if (tried(challenger)) decision.challenger_return = MeanReturn(challenger);
   if (tried(incumbent_)) decision.incumbent_return = MeanReturn(incumbent_);
   if (tried(challenger) && tried(incumbent_))
-    decision.probability = Better(challenger, scatter, decision.simulated);
+    decision.probability = Better(challenger, beginnings, decision.simulated);
   incumbent_ = challenger;
   return decision;
 }
 
 Acceptance::Decision Acceptance::Choose(Trainer& trainer, const GaussianPolicy& incumbent,
                                         int challenger, const ParameterDistribution& learnt) {
-  const double scatter = trainer.ScatterOfStarts(learnt.Mean());
-  if (learnt.explained) return Trust(challenger, scatter);
+  const auto trials = [&](int steps) { return trainer.TrialReturns(learnt.Mean(), steps); };
+  const auto beginnings = Beginnings::Of(trials(std::max(1, longest_trial())), trials(steps_));
+  if (learnt.explained) return Trust(challenger, beginnings);
   const auto simulated = [&](const GaussianPolicy& policy) {
     const ParameterSampler sample = [&](Random& random) { return learnt.Draw(random); };
     return trainer.HeldOutReturns(policy, sample, kSimulators);
   };
-  return Decide(challenger, scatter,
+  return Decide(challenger, beginnings,
                 Simulated::Of(simulated(trainer.policy()), simulated(incumbent)));
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <map>
 #include <span>
 #include <string>
@@ -27,10 +28,10 @@ namespace plumb {
 /// policies that this robot has tried, its own trials among them (empirical Bayes); zero where none
 /// has fallen. What counts is the expectation over lambda, in closed form: how unsure lambda is
 /// says nothing for or against a challenger that has been tried as long as the incumbent.
-/// Returns of trials scatter, falls apart, by kScatter of themselves or, where it is more, by
-/// what it makes where an episode begins; the mean of n by 1 / sqrt(n) of that. kScatter is
-/// that of 29 trials of four hoppers without a fall, which begin alike, each against the mean
-/// of ten whole episodes (docs/gap.md).
+/// What trials say of a return scatters, falls apart, by kScatter of it or, where it is more, by
+/// what returns of whole episodes scatter by; the mean of n by 1 / sqrt(n) of that. kScatter is
+/// that of 29 trials of four hoppers without a fall, which begin alike, each against the mean of
+/// ten whole episodes (docs/gap.md).
 ///
 /// What a trial does not see are falls after it, and from other starts. Simulators that were learnt
 /// since know of them: of too many, but of more where a policy does fall. Challenger and incumbent
@@ -38,10 +39,14 @@ namespace plumb {
 /// the difference in simulation (docs/gap.md).
 ///
 /// Where an episode may begin anywhere, as a pendulum's, a trial says more of where it began than
-/// of the policy, and simulators, where both begin alike, say more. If returns scatter by more than
-/// kBeginnings of themselves by where they begin, the two differences are weighted by how precise
-/// they are (inverse-variance weighting): that of trials by their scatter, that in simulation by
-/// the scatter of its mean, and by 1 - kSimulated of itself, as simulators may be wrong by that.
+/// of the policy, and simulators, where both begin alike, say more. If what trials say scatters by
+/// more than kBeginnings of itself by where they begin, the two differences are weighted by how
+/// precise they are (inverse-variance weighting): that of trials by their scatter, that in
+/// simulation by the scatter of its mean, and by 1 - kSimulated of itself, as simulators may be
+/// wrong by that; or, where the two disagree by more than that and the scatter of trials explain,
+/// by what is left (DerSimonian and Laird, Controlled Clinical Trials 7, 1986, of two studies with
+/// the doubt given to one): trials that are bad beyond chance outweigh simulators that know no
+/// difference.
 /// Not thread-safe; the same bits for the same trials.
 class Acceptance {
  public:
@@ -55,7 +60,7 @@ class Acceptance {
   void Add(int iteration, const Trial& trial);
 
   /// What both return in an episode of simulators that were learnt since the challenger's trial,
-  /// means; NaN = they cannot say.
+  /// means over those in which neither failed; NaN = they cannot say.
   struct Simulated {
     double challenger = 0, incumbent = 0;
     double difference_sd = 0;  ///< of the difference of the means, for the few simulators, >= 0
@@ -63,6 +68,16 @@ class Acceptance {
     /// one failed
     /// @throws std::invalid_argument if these are not as many.
     static Simulated Of(std::span<const double> challenger, std::span<const double> incumbent);
+  };
+
+  /// What the challenger returns in one simulator from wherever an episode may begin, falls apart:
+  /// as trials say, and in whole episodes. No mean (NaN) and no scatter where all fall.
+  struct Beginnings {
+    double mean = 0, trial_sd = 0;
+    double whole_sd = 0;
+    /// @param trials,whole as of Trainer::TrialReturns.
+    static Beginnings Of(std::span<const double> trials, std::span<const double> whole);
+    bool decide() const { return trial_sd > kBeginnings * std::abs(mean); }
   };
 
   /// How the latest challenger has done.
@@ -75,12 +90,11 @@ class Acceptance {
     Simulated simulated;  ///< NaN where nobody was asked
   };
   /// Makes the challenger the incumbent if it is better with probability kSure.
-  /// @param scatter of a trial's return by where it begins, sd, >= 0
   /// @throws std::invalid_argument if it has had no trial.
-  Decision Decide(int challenger, double scatter, const Simulated& simulated);
+  Decision Decide(int challenger, const Beginnings& beginnings, const Simulated& simulated);
   /// Makes it the incumbent whatever the trials say: where the model explains the robot, training
-  /// on it is the better judge. It need not have had a trial. @param scatter as above
-  Decision Trust(int challenger, double scatter);
+  /// on it is the better judge. It need not have had a trial.
+  Decision Trust(int challenger, const Beginnings& beginnings);
   /// Trusts the challenger where the simulators that were learnt since explain the robot, else
   /// decides, with both policies' returns in kSimulators of them, those held out.
   /// @param trainer whose policy is the challenger. @param incumbent the incumbent's policy.
@@ -101,7 +115,8 @@ class Acceptance {
   static constexpr int kSimulators = 60;  ///< that Simulated is to be of
 
  private:
-  double Better(int challenger, double scatter, const Simulated& simulated) const;
+  int longest_trial() const;  // [steps]; 0 without any
+  double Better(int challenger, const Beginnings& beginnings, const Simulated& simulated) const;
 
   int steps_;
   int incumbent_ = -1;

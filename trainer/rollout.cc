@@ -9,6 +9,7 @@
 
 #include "common/shares.h"
 #include "common/special_numbers.h"
+#include "controller/trial.h"
 
 namespace plumb {
 namespace {
@@ -250,14 +251,18 @@ std::vector<double> RolloutSampler::Returns(const GaussianPolicy& policy,
   return returns;
 }
 
-std::vector<double> RolloutSampler::WholeReturns(const GaussianPolicy& policy,
-                                                 const ParameterSampler& sample, int episodes,
-                                                 uint64_t seed, uint32_t stream, uint32_t number) {
+std::vector<double> RolloutSampler::TrialReturns(const GaussianPolicy& policy,
+                                                 const ParameterSampler& sample, int trial_steps,
+                                                 int episodes, uint64_t seed, uint32_t stream,
+                                                 uint32_t number) {
   std::vector<double> returns;
   for (const EpisodeRecord& record :
        Run(policy, sample, 0, episodes, false, seed, stream, number)) {
+    Trial trial;
+    for (int i = 0; i < std::min(trial_steps, record.steps()); ++i)
+      trial.Add(record.rewards[static_cast<size_t>(i)], trial_steps);
     const bool whole = record.usable && !record.terminated;
-    returns.push_back(whole ? record.sum : kNaN);
+    returns.push_back(whole ? trial.WholeReturn(record.steps()) : kNaN);
   }
   return returns;
 }

@@ -93,9 +93,11 @@ class RolloutSampler {
   /// finite.
   std::vector<double> Returns(const GaussianPolicy& policy, const ParameterSampler& sample,
                               int episodes, uint64_t seed, uint32_t stream, uint32_t number);
-  /// The same; NaN where an episode ended before the time limit, too.
-  std::vector<double> WholeReturns(const GaussianPolicy& policy, const ParameterSampler& sample,
-                                   int episodes, uint64_t seed, uint32_t stream, uint32_t number);
+  /// What trials of so many steps say of the same (Trial::WholeReturn); NaN where an episode ended
+  /// before the time limit, too. @param trial_steps >= 1; more than an episode has are all of it
+  std::vector<double> TrialReturns(const GaussianPolicy& policy, const ParameterSampler& sample,
+                                   int trial_steps, int episodes, uint64_t seed, uint32_t stream,
+                                   uint32_t number);
 
  private:
   struct Player;

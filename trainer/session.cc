@@ -183,7 +183,7 @@ UpdateReport TrainingSession::Advance() {
     complete_ = true;
     // The last one has no trial: it is trusted, or nothing but one that has had a trial is run.
     if (finished() && trial_steps() > 0 && (distribution_.explained || !incumbent_policy_))
-      Adopt(acceptance_.Trust(iteration_, 0), iteration_);
+      Adopt(acceptance_.Trust(iteration_, {}), iteration_);
   }
   return last_;
 }

@@ -17,7 +17,7 @@
 namespace plumb {
 namespace {
 
-constexpr int kJudgements = 16, kJudgementEpisodes = 30, kScatterEpisodes = 40;
+constexpr int kJudgements = 16, kJudgementEpisodes = 30, kTrials = 40;
 constexpr double kOutputGain = 0.01;  // of a fresh policy: every mean action is near 0
 
 PolicyShape ShapeFor(const TrainingSettings& settings, const SimulationFactory& make,
@@ -226,9 +226,9 @@ std::vector<double> Trainer::HeldOutReturns(const GaussianPolicy& policy,
   return rollout_.Returns(policy, sample, episodes, seed_, kHeldOutStream, 0);
 }
 
-double Trainer::ScatterOfStarts(const SimulatorDraw& simulator) {
-  return Scatter(rollout_.WholeReturns(
-      policy_, [&](Random&) { return simulator; }, kScatterEpisodes, seed_, kHeldOutStream, 0));
+std::vector<double> Trainer::TrialReturns(const SimulatorDraw& simulator, int trial_steps) {
+  return rollout_.TrialReturns(
+      policy_, [&](Random&) { return simulator; }, trial_steps, kTrials, seed_, kHeldOutStream, 0);
 }
 
 }  // namespace plumb

@@ -117,10 +117,10 @@ class Trainer {
   /// Of any policy: the returns themselves, NaN where an episode failed.
   std::vector<double> HeldOutReturns(const GaussianPolicy& policy, const ParameterSampler& sample,
                                      int episodes);
-  /// By how much (sd) the policy's returns in one simulator differ for where the task lets an
-  /// episode begin: Scatter of those of 40 episodes without exploration, always the same, that last
-  /// until the time limit.
-  double ScatterOfStarts(const SimulatorDraw& simulator);
+  /// What 40 trials of the policy in one simulator say of its return, from wherever the task lets an
+  /// episode begin, always the same; NaN where an episode ended before the time limit.
+  /// @param trial_steps of each, >= 1
+  std::vector<double> TrialReturns(const SimulatorDraw& simulator, int trial_steps);
 
  private:
   bool starts_anew() const;

@@ -120,5 +120,13 @@ TEST_CASE("a budget is kept, and transitions are spread or the first") {
   CHECK_THROWS_AS(FitWithin(robot, rollouts, 100, 1, 1), std::invalid_argument);
 }
 
+TEST_CASE("without randomisation the robot is that of the prior's means") {
+  const RobotDescription robot =
+      LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/hopper");
+  const auto nominal = FirstDistribution(CalibrationStrategy::kNominal, robot, {});
+  for (size_t i = 0; i < robot.parameters.size(); ++i)
+    CHECK(nominal.Mean()(static_cast<Eigen::Index>(i)) == Approx(robot.parameters[i].mean));
+}
+
 }  // namespace
 }  // namespace plumb

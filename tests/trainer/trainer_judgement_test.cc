@@ -1,4 +1,5 @@
 // Which policy a training goes on with, and what policies are judged by.
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 
@@ -73,12 +74,18 @@ class StartDecides : public GymPendulum {
   double start_ = 0;
 };
 
-TEST_CASE("returns scatter by where episodes begin") {
-  // of u between 0.3 and 1, where they do not fall: 10 u scatters by 7 / sqrt 12
+TEST_CASE("trials scatter by where episodes begin") {
+  // of u between 0.3 and 1, where they do not fall: 10 u scatters by 7 / sqrt 12, with a mean of
+  // 6.5, whether a trial is all of the ten steps or three
   const auto make = [] { return std::make_unique<StartDecides>(); };
   Trainer trainer(SmallSettings(), make, PendulumScale(), 5, 2);
-  CHECK(trainer.ScatterOfStarts({Eigen::Vector3d(10, 1, 1)}) ==
-        Approx(7 / std::sqrt(12)).epsilon(0.15));
+  for (const int steps : {3, 10, 99}) {
+    const std::vector<double> trials = trainer.TrialReturns({Eigen::Vector3d(10, 1, 1)}, steps);
+    CHECK(trials.size() == 40);
+    CHECK(std::ranges::count_if(trials, [](double x) { return std::isnan(x); }) > 3);
+    CHECK(Evaluate(trials).mean == Approx(6.5).epsilon(0.15));
+    CHECK(Scatter(trials) == Approx(7 / std::sqrt(12)).epsilon(0.15));
+  }
 }
 
 TEST_CASE("Training returns to the best policy that was judged") {
