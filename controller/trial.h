@@ -10,8 +10,8 @@ struct Trial {
   bool fell = false;     ///< ended by the task; else by time
 
   /// One that did not come to its end, as the driver or a late state stopped it, has failed and
-  /// earns nothing more. Where steps cost it goes on to pay what they did, or being stopped would be
-  /// the cheapest episode of all.
+  /// earns nothing more. Where steps cost it goes on to pay what they did, or being stopped would
+  /// be the cheapest episode of all.
   static Trial Stopped(int steps, double sum_of_rewards);
 
   /// Adds a control step's reward. @param planned steps of the whole trial, >= 1.

@@ -117,8 +117,8 @@ class Trainer {
   /// Of any policy: the returns themselves, NaN where an episode failed.
   std::vector<double> HeldOutReturns(const GaussianPolicy& policy, const ParameterSampler& sample,
                                      int episodes);
-  /// What 40 trials of the policy in one simulator say of its return, from wherever the task lets an
-  /// episode begin, always the same; NaN where an episode ended before the time limit.
+  /// What 40 trials of the policy in one simulator say of its return, from wherever the task lets
+  /// an episode begin, always the same; NaN where an episode ended before the time limit.
   /// @param trial_steps of each, >= 1
   std::vector<double> TrialReturns(const SimulatorDraw& simulator, int trial_steps);
 
