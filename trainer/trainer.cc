@@ -42,6 +42,7 @@ GaussianPolicy FreshPolicy(const TrainingSettings& settings, const PolicyShape& 
 }  // namespace
 
 TrainingSettings PaperSettings(TrainingSettings settings) {
+  settings.starts = 1;
   settings.batch = 3000;
   settings.gamma = .995;
   settings.lambda = .97;

@@ -16,9 +16,9 @@
 namespace plumb {
 
 /// The settings of the paper where ours learn faster: batches, discounts and KL bound of its table,
-/// value targets in units of return, the whole batch for Fisher's matrix. The paper does not say
-/// how long its critic is fitted; targets so large need 20 passes, 10 leave one seed in ten behind.
-/// Thread-safe.
+/// value targets in units of return, the whole batch for Fisher's matrix; one start, as the paper
+/// keeps its last policy and judges none. It does not say how long its critic is fitted; targets so
+/// large need 20 passes, 10 leave one seed in ten behind. Thread-safe.
 TrainingSettings PaperSettings(TrainingSettings settings);
 
 /// A policy that was judged, the critic that goes with it, and what its normaliser follows.

@@ -55,6 +55,8 @@ TEST_CASE("Of several starts none learns from another, and the best policy goes 
   for (int i = 0; i < 4; ++i) update(given);
   CHECK((given.policy().parameters - single.policy().parameters).norm() <
         (given.policy().parameters - make(settings).policy().parameters).norm());
+  // Where nothing is judged, the last start would go on, however bad.
+  CHECK(PaperSettings(settings).first_updates() == settings.updates);
 }
 
 /// Begins with u anywhere in [0, 1), which is the reward of each of ten steps; falls at once if it
